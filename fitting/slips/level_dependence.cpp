@@ -6,6 +6,7 @@
 #include <map>
 #include <numeric>
 #include <optional>
+#include <utility>
 
 #include "dynamics/dense_solve.hpp"
 
@@ -257,14 +258,19 @@ Paired gain_of(const std::vector<Levels>& all, const Errors& before, const Error
 
 /// The surface in turn with what its level depends on: fitted to the wrenches without that.
 Levels in_turn(const SlipSamples& slips, const SlipSurface& fit, const std::vector<LevelBy>& of) {
-  constexpr int kRounds = 3;
+  constexpr int kMostRounds = 20;
+  constexpr double kAtRest = 1e-4;  // of a factor
   Levels levels(slips, fit);
-  for (int round = 0; round < kRounds; ++round) {
+  std::vector<double> factors(slips.samples.size(), 1.0);
+  double moved = HUGE_VAL;
+  for (int round = 0; round < kMostRounds && moved > kAtRest; ++round) {
     const LevelFit dependence(levels, of, rows_where(levels, [](int) { return true; }));
     SlipSamples level = slips;
+    moved = 0;
     for (std::size_t i = 0; i < level.samples.size(); ++i) {
       const double factor = dependence.at(levels, i);
       if (!(factor > 0)) return levels;
+      moved = std::max(moved, std::abs(factor - std::exchange(factors[i], factor)));
       for (double& w : level.samples[i].wrench) w /= factor;
     }
     const SurfaceFit again = fit_surface(level, fit.model);

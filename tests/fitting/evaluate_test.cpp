@@ -302,6 +302,13 @@ TEST(Card, RoundTripIsExact) {
   EXPECT_EQ(again.values(), fit_of_disc().values());
   EXPECT_EQ(again.covariance, fit_of_disc().covariance);
   EXPECT_EQ(again.own_spread, fit_of_disc().own_spread);
+  for (std::size_t k = 0; k < again.campaign.size(); ++k) {
+    const FittedUnknown &is = again.campaign[k], &was = fit_of_disc().campaign[k];
+    EXPECT_EQ(is.sigma, was.sigma) << was.unknown.name;
+    EXPECT_EQ(is.interval95(), was.interval95()) << was.unknown.name;
+    EXPECT_EQ(is.interval_freedom(), was.interval_freedom()) << was.unknown.name;
+    EXPECT_EQ(is_determined(again, k), is_determined(fit_of_disc(), k)) << was.unknown.name;
+  }
   const auto predicted = predict_some(problem, again, {3});
   EXPECT_EQ(predicted[0].comparison.prediction.landing.pose.x,
             throws[3].comparison.prediction.landing.pose.x);

@@ -1,6 +1,5 @@
 // Least squares over groups with robust weights: it ends at the minimum, whatever it started from.
 #include "fitting/measured/grouped_fit.hpp"
-#include "fitting/measured/effect_trial.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +8,12 @@
 #include <cmath>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
+
+#include "fitting/measured/effect_trial.hpp"
+#include "fitting/measured/residual_tests.hpp"
+#include "fitting/measured/wild_groups.hpp"
 
 namespace unhand::fitting {
 namespace {
@@ -228,6 +232,209 @@ TEST(GroupedFit, TheCovarianceOfParametersThatAreNearlyTheSameIsOne) {
     EXPECT_LE(std::abs(C(0, 1) - C(1, 0)), 1e-12 * scale) << e;
     EXPECT_LE(std::abs(C(0, 1)), (1 + 1e-12) * scale) << e;
   }
+}
+
+/// Groups of one channel at the times 0, 1, 2, ... with σ = 1: y = c + slope a t, c of the group, a of all.
+class Lines final : public GroupedProblem {
+ public:
+  explicit Lines(std::vector<std::vector<double>> measured, double slope = 1)
+      : measured_(std::move(measured)), slope_(slope) {
+    channels_ = {"y"};
+    for (std::size_t g = 0; g < measured_.size(); ++g) {
+      Group group{"g" + std::to_string(g), "object", "", datasets::Split::train, {}, {0.0}, {}};
+      for (std::size_t i = 0; i < measured_[g].size(); ++i) group.rows.push_back({0, static_cast<double>(i)});
+      groups_.push_back(std::move(group));
+    }
+  }
+  Group& group(std::size_t g) { return groups_[g]; }
+  std::vector<dynamics::Effect> effects() const override { return {}; }
+  GroupEquations equations(std::size_t group, std::span<const std::string>, std::span<const double> values,
+                           const Eigen::VectorXd& own, Derivatives derivatives) const override {
+    const auto residual = [&]<class S>(const std::vector<S>& shared, const std::vector<S>& offset) {
+      std::vector<S> out;
+      for (std::size_t i = 0; i < measured_[group].size(); ++i) {
+        out.push_back(offset[0] - measured_[group][i]);
+        if (!shared.empty()) out.back() += shared[0] * (slope_ * static_cast<double>(i));
+      }
+      return out;
+    };
+    return swept({values.begin(), values.end()}, own, derivatives, residual);
+  }
+
+ private:
+  std::vector<std::vector<double>> measured_;
+  double slope_;
+};
+
+GroupedFit fit_line(const GroupedProblem& problem, bool robust = false) {
+  GroupedFitOptions options;
+  options.robust = robust;
+  return fit_groups(problem, datasets::Split::train, {parameters(100).front()}, Eigen::VectorXd::Zero(1),
+                    options);
+}
+
+TEST(GroupedFit, GroupsThatAreSetAsideTakeNoPart) {
+  Lines problem({{0, 50, 100}, {1, 2, 3}, {4, 5, 6}, {0, 1, 2}});
+  problem.set_aside({0});
+  const auto fit = fit_line(problem);
+  EXPECT_EQ(fit.used, 3);
+  EXPECT_NEAR(fit.values[0], 1, 1e-9);
+  EXPECT_NEAR(fit.chi2, 0, 1e-9);
+  // Three numbers of each group, less one for each and one for all.
+  EXPECT_EQ(fit.samples, 9);
+  EXPECT_EQ(fit.degrees_of_freedom, 9 - 3 - 1);
+}
+
+// In the place of a held-out group that is set aside, one of its own condition is held out: until that is
+// taken back.
+TEST(GroupedFit, AHeldOutGroupThatIsSetAsideIsReplacedByOneOfItsCondition) {
+  using datasets::Split;
+  Lines problem(std::vector<std::vector<double>>(5, {0, 1, 2}));
+  for (const std::size_t g : {0, 3}) problem.group(g).condition = "a";
+  for (const std::size_t g : {1, 2, 4}) problem.group(g).condition = "b";
+  problem.group(0).split = Split::test;
+  const auto held_out = [&] {
+    std::string out;
+    for (const Group& g : problem.groups()) out += g.set_aside ? "-" : g.split == Split::test ? "1" : "0";
+    return out;
+  };
+  problem.set_aside({0});
+  EXPECT_EQ(held_out(), "-0010");
+  problem.set_aside({2});
+  EXPECT_EQ(held_out(), "10-00");
+  problem.set_aside({});
+  EXPECT_EQ(held_out(), "10000");
+}
+
+// Of what no group sees nothing is known but its range, over which it is spread evenly.
+TEST(GroupedFit, WhatNoGroupSeesIsAsUncertainAsItsRange) {
+  const auto fit = fit_line(Lines(std::vector<std::vector<double>>(6, {0, 1, 2}), 0));
+  EXPECT_NEAR(fit.sigma(0), 200 / std::sqrt(12), 1e-6);
+}
+
+// One that errs as no other does counts less, and its scatter with it.
+TEST(GroupedFit, AGroupThatCountsLessScattersLess) {
+  std::vector<std::vector<double>> measured;
+  std::mt19937_64 random(7);
+  std::normal_distribution<double> normal;
+  for (int g = 0; g < 30; ++g) {
+    auto& y = measured.emplace_back();
+    for (int i = 0; i < 20; ++i) y.push_back((g == 0 ? 5 : 1) * i + normal(random));
+  }
+  const Lines problem(measured);
+  const auto plain = fit_line(problem), robust = fit_line(problem, true);
+  ASSERT_LT(robust.weights.group[0], 0.1);
+  EXPECT_LT(robust.sigma(0), 0.3 * plain.sigma(0));
+}
+
+// Noise of three times what was declared, of which neighbours correlate by 0.6: the mean of many samples is
+// as uncertain as that of a quarter of them, so that what was known before counts 3 √4 times as much.
+TEST(GroupedFit, WhatIsKnownBeforehandCountsMoreBesideNoiseThatStays) {
+  constexpr double kScatter = 3, kAlike = 0.6;
+  std::vector<std::vector<double>> measured;
+  std::mt19937_64 random(8);
+  std::normal_distribution<double> normal;
+  for (int g = 0; g < 20; ++g) {
+    auto& y = measured.emplace_back();
+    double noise = kScatter * normal(random);
+    for (int i = 0; i < 300; ++i) {
+      y.push_back(noise);
+      noise = kAlike * noise + std::sqrt(1 - kAlike * kAlike) * kScatter * normal(random);
+    }
+  }
+  const auto fit = fit_line(Lines(measured), true);
+  EXPECT_NEAR(fit.weights.channel_scale[0], kScatter, 0.1 * kScatter);
+  EXPECT_NEAR(fit.weights.prior, kScatter * std::sqrt((1 + kAlike) / (1 - kAlike)), 0.6);
+}
+
+/// Whose derivative has the wrong sign: every step leads uphill.
+class Misled final : public GroupedProblem {
+ public:
+  Misled() {
+    channels_ = {"y"};
+    groups_.push_back({"g", "object", "", datasets::Split::train, {{0, 0}, {0, 1}}, {0.0}, {}});
+  }
+  std::vector<dynamics::Effect> effects() const override { return {}; }
+  GroupEquations equations(std::size_t, std::span<const std::string>, std::span<const double> values,
+                           const Eigen::VectorXd& own, Derivatives) const override {
+    return {true, Eigen::Vector2d(own[0], own[0] + values[0] - 3), Eigen::Vector2d(0, -1),
+            Eigen::Vector2d(1, 1)};
+  }
+};
+
+TEST(GroupedFit, StepsThatLeadUphillAreTakenBack) {
+  const auto fit = fit_line(Misled());
+  EXPECT_EQ(fit.values[0], 0);
+}
+
+TEST(GroupedFit, AGroupReadsTheParametersOfItsOwnObject) {
+  const std::vector<std::string> all{"g", "k[ball]", "k[box]", "m[boxer]", "n[box]"};
+  const OwnNames box(all, "box");
+  EXPECT_EQ(box.names, (std::vector<std::string>{"g", "k", "n"}));
+  EXPECT_EQ(box.values(std::vector<double>{1, 2, 3, 4, 5}), (std::vector<double>{1, 3, 5}));
+}
+
+// The residuals of one group are five times those of the others: it errs 25 times as much, however little it
+// counted for in the fit.
+TEST(WildGroups, ErrByWhatTheyAreOffAndNotByWhatTheyCountFor) {
+  std::vector<std::vector<double>> measured(20, {1, -1, 1, -1, 1, -1, 1, -1});
+  for (double& y : measured[7]) y *= 5;
+  const auto wild = wild_groups(Lines(measured, 0), {}, {});
+  ASSERT_EQ(wild.size(), 1U);
+  EXPECT_EQ(wild.front().group, 7U);
+  EXPECT_NEAR(wild.front().times, 25, 1e-6);
+  EXPECT_NEAR(wild.front().apart, 25, 1e-6);
+}
+
+// A fit of an offset to four samples leaves neighbours against each other: of white noise that is no
+// correlation.
+TEST(ResidualTests, WhiteNoiseDoesNotCorrelateHoweverFewSamplesAGroupHas) {
+  std::vector<std::vector<double>> measured;
+  std::mt19937_64 random(9);
+  std::normal_distribution<double> normal;
+  for (int g = 0; g < 3000; ++g) {
+    auto& y = measured.emplace_back();
+    for (int i = 0; i < 4; ++i) y.push_back(normal(random));
+  }
+  const Lines problem(measured, 0);
+  GroupedFitOptions options;
+  options.robust = false;
+  const auto fit = fit_groups(problem, datasets::Split::train, {}, Eigen::VectorXd(), options);
+  const auto found = autocorrelation(problem, fit);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_NEAR(found.front().lag1, 0, 0.04);  // of 9000 pairs: 0 ± 0.011
+}
+
+// Three groups that are 1, 2 and 3 σ off: their mean is 2 ± 1/√3.
+TEST(ResidualTests, AProfileIsAsSureAsItsGroupsAgree) {
+  const Lines problem({{0, 0}, {0, 0}, {0, 0}});
+  GroupedFit fit;
+  for (const double off : {1.0, 2.0, 3.0}) {
+    GroupFit& g = fit.groups.emplace_back();
+    g.used = g.solved = true;
+    g.residual = Eigen::Vector2d(off, -1);
+  }
+  const auto profile = residual_profile(problem, fit, 2);
+  ASSERT_EQ(profile.size(), 2U);
+  EXPECT_NEAR(profile[0].mean, 2, 1e-12);
+  EXPECT_NEAR(profile[0].rms, std::sqrt(14.0 / 3), 1e-12);
+  EXPECT_NEAR(profile[0].z, 2 * std::sqrt(3.0), 1e-12);
+  EXPECT_EQ(profile[1].mean, -1);
+}
+
+// Five samples whose squares sum to 16 beside their mean, which has taken one of them: 4 of each degree of
+// freedom.
+TEST(ResidualTests, WhatIsLeftIsCountedPerDegreeOfFreedom) {
+  std::vector<double> y;
+  for (int k = 0; k < 6; ++k) y.insert(y.end(), {3, -1, 3, -1, 1});
+  const Lines problem(std::vector<std::vector<double>>(10, y), 0);
+  GroupedFitOptions options;
+  options.robust = false;
+  const auto fit = fit_groups(problem, datasets::Split::train, {}, Eigen::VectorXd(), options);
+  const LeavesNoise found = leaves_noise(problem, fit, 1.5, 1);
+  ASSERT_TRUE(found.any && found.at_once);
+  EXPECT_NEAR(found.time, 0.15 * 29, 1e-9);  // the first five
+  EXPECT_NEAR(found.chi2_per_dof, 4, 1e-9);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <map>
+#include <random>
 #include <set>
 #include <string>
 
@@ -69,6 +70,33 @@ TEST(HeldOutSplit, EveryGripIsOnBothSides) {
   for (const auto& t : log.throws) sides[firm[t.condition]].insert(t.split);
   EXPECT_EQ(sides[true].size(), 2U);
   EXPECT_EQ(sides[false].size(), 2U);
+}
+
+// Motions that are alike are shared out, but no object gives up its share: of its n conditions n/2 are held
+// out, whatever other objects were thrown like.
+TEST(HeldOutSplit, EveryObjectKeepsItsHalfOfTheConditions) {
+  std::mt19937_64 random(7);
+  std::uniform_int_distribution<int> count(2, 5);
+  std::normal_distribution<double> normal;
+  for (int set = 0; set < 100; ++set) {
+    ThrowLog log;
+    std::map<std::string, int> conditions;
+    for (const char* object : {"a", "b", "c"}) {
+      conditions[object] = count(random);
+      for (int k = 0; k < conditions[object]; ++k) {
+        auto& t = log.throws.emplace_back();
+        t.object = object, t.condition = std::to_string(k);
+        const auto moved = [&] {
+          return datasets::Series{1, 3, {normal(random), normal(random), normal(random)}, {}};
+        };
+        t.hand = datasets::HandLog{{1, 1, {0}, {}}, moved(), moved(), moved()};
+      }
+    }
+    std::map<std::string, int> held_out;
+    for (const auto& t : with_held_out(log).throws) held_out[t.object] += t.split == Split::test;
+    for (const auto& [object, n] : conditions)
+      EXPECT_EQ(held_out[object], n / 2) << object << " of set " << set;
+  }
 }
 
 TEST(HeldOutSplit, AnObjectWithOneConditionIsSplitByRepetition) {

@@ -28,7 +28,9 @@ struct Campaign {
     for (std::size_t k = 0; k < problem->own().size(); ++k)
       if (problem->own()[k].name == "mu_deviation") mu = k;
   }
-  std::optional<OwnDrift> drift(const std::function<double(std::size_t)>& deviation) const {
+  std::optional<OwnDrift> drift(
+      const std::function<double(std::size_t)>& deviation,
+      const std::function<double(std::size_t)>& weight = [](std::size_t) { return 1.0; }) const {
     FitResult halves[2];
     for (std::size_t i = 0; i < problem->throws().size(); ++i)
       for (const bool train : {true, false}) {
@@ -36,6 +38,7 @@ struct Campaign {
         one.used = train == (problem->throws()[i].prepared.split == datasets::Split::train);
         one.own.assign(problem->own().size(), 0.0);
         one.own[mu] = deviation(i);
+        one.weight = weight(i);
         halves[train ? 0 : 1].throws.push_back(one);
       }
     return own_drift(*problem, halves[0], halves[1], 0.02);
@@ -99,6 +102,29 @@ TEST(OwnDrift, FrictionThatGoesUpAndDownIsSeen) {
     const bool train = campaign.problem->throws()[i].prepared.split == datasets::Split::train;
     return (train ? wave(i) : 0) + 0.02 * normal(random);
   }));
+}
+
+// Every fourth throw went wrong, and the fit lets it count less: these have no say, neither against wear nor
+// for it.
+TEST(OwnDrift, ThrowsThatWentWrongHaveNoSay) {
+  const Campaign campaign(3);
+  const auto n = static_cast<double>(campaign.log.throws.size());
+  const auto is_wrong = [](std::size_t i) { return i % 4 == 1; };
+  const auto weight = [&](std::size_t i) { return is_wrong(i) ? 0.3 : 1.0; };
+  std::mt19937_64 random(6);
+  std::normal_distribution<double> normal;
+  const auto worn = campaign.drift(
+      [&](std::size_t i) {
+        return is_wrong(i) ? 0.4 * normal(random)
+                           : -0.15 * static_cast<double>(i) / (n - 1) + 0.01 * normal(random);
+      },
+      weight);
+  ASSERT_TRUE(worn.has_value());
+  EXPECT_NEAR(worn->change, -0.15, 0.03);
+  const auto only_the_wrong = [&](std::size_t i) {
+    return is_wrong(i) ? -2 * static_cast<double>(i) / (n - 1) : 0.01 * normal(random);
+  };
+  EXPECT_FALSE(campaign.drift(only_the_wrong, weight));
 }
 
 TEST(OwnDrift, ChanceIsHardlyEverOne) {

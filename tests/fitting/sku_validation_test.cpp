@@ -90,6 +90,122 @@ TEST(SkuValidation, DerivativesAreTheCentralDifferenceInEveryInput) {
   }
 }
 
+// The object itself is another: heavier, harder to turn, or loaded elsewhere.
+TEST(SkuValidation, DerivativesAreWhatAnotherObjectLandsLike) {
+  const auto landing = [](const datasets::Sku& sku) {
+    const auto thrown = experiment::reference_throw(sku.name, datasets::to_object(sku));
+    auto inputs = throw_inputs(sku, card(), "card.json", thrown);
+    inputs.model.integrator.tolerances = {1e-11, 1e-13};
+    return experiment::predict_channels(thrown, {}, inputs.model,
+                                        dynamics::Values<double>(inputs.names, inputs.values))
+        .landing.pose;
+  };
+  const auto sku = bar();
+  const auto thrown = experiment::reference_throw(sku.name, datasets::to_object(sku));
+  const auto inputs = throw_inputs(sku, card(), "card.json", thrown);
+  const Eigen::MatrixXd slopes =
+      experiment::outcome_slopes(thrown, inputs.model, inputs.names, inputs.values).value() * inputs.mixing();
+  int found = 0;
+  for (std::size_t k = 0; k < inputs.inputs.size(); ++k) {
+    const std::string& name = inputs.inputs[k].name;
+    const double step = 0.02 * inputs.inputs[k].sigma;
+    auto more = sku, less = sku;
+    if (name == "mass") {
+      more.mass += step, less.mass -= step;
+    } else if (name == "inertia") {
+      *more.inertia += step, *less.inertia -= step;
+    } else if (name == "com_offset") {
+      more.com_offset += step, less.com_offset -= step;
+    } else {
+      continue;
+    }
+    ++found;
+    const auto up = landing(more), down = landing(less);
+    const auto column = static_cast<Eigen::Index>(k);
+    const double x = (up.x - down.x) / (2 * step), theta = (up.theta - down.theta) / (2 * step);
+    EXPECT_NEAR(slopes(experiment::kLandingX, column), x, 5e-3 * std::abs(x)) << name;
+    EXPECT_NEAR(slopes(experiment::kLandingTheta, column), theta, 5e-3 * std::abs(theta)) << name;
+  }
+  EXPECT_EQ(found, 3);
+}
+
+/// A log of motions for the bar, and a request to try them.
+struct LoggedMotions {
+  datasets::ThrowLog log;
+  SkuRequest request = quick(100);
+  explicit LoggedMotions(int repetitions, const std::string& name = "quick12") {
+    auto design = experiment::campaign_design(name);
+    design.objects = {experiment::loaded_bar("bar-com100", 0.10)};
+    design.repetitions = repetitions;
+    log = experiment::generate_campaign(design, 5);
+    request.log = &log;
+    request.log_file = "synthetic";
+  }
+};
+
+// One lands in the middle but turned; another a little beside it but straight. In units of the tolerance the
+// second is the nearer to the mean, where x is asked for to a metre; and the first, to a millimetre.
+TEST(SkuValidation, TheMiddleRepetitionIsNearestInUnitsOfTheTolerance) {
+  LoggedMotions m(3);
+  LoggedLandings landings(m.log.throws.size());
+  std::vector<std::size_t> same;
+  for (std::size_t i = 0; i < m.log.throws.size(); ++i)
+    if (repeated_motion(m.log.throws[i]) == repeated_motion(m.log.throws.front())) same.push_back(i);
+  ASSERT_EQ(same.size(), 3U);
+  landings[same[0]] = {0, 0.4}, landings[same[1]] = {0.02, 0}, landings[same[2]] = {-0.02, -0.4};
+  const auto tried = [&](double x_tolerance) {
+    m.request.tolerance = {x_tolerance, 0.1};
+    return motions_of(bar(), card(), "card.json", m.request, landings).front().prepared.id;
+  };
+  EXPECT_EQ(tried(1), m.log.throws[same[1]].id);
+  EXPECT_EQ(tried(1e-3), m.log.throws[same[0]].id);
+}
+
+// Where the grip lets the object slip before it opens, no landing is foretold, wherever it would fall.
+TEST(SkuValidation, ThrowsThatTheGripLosesLandNowhere) {
+  LoggedMotions m(2);
+  int lost = 0, held = 0;
+  for (const double mu : {0.5, 0.3, 0.2, 0.12, 0.08}) {
+    auto gripper = card();
+    gripper.parameters["mu"].value = mu;
+    const auto landings = logged_landings(bar(), gripper, "card.json", m.request);
+    for (const SkuMotion& motion : motions_of(bar(), gripper, "card.json", m.request, {landings})) {
+      const ThrowCandidate one = candidate_of(motion);
+      const auto at = std::find_if(m.log.throws.begin(), m.log.throws.end(),
+                                   [&](const auto& t) { return t.id == motion.prepared.id; });
+      ASSERT_NE(at, m.log.throws.end());
+      EXPECT_EQ(landings[static_cast<std::size_t>(at - m.log.throws.begin())].has_value(),
+                one.held && one.landed)
+          << mu;
+      lost += one.landed && !one.held, held += one.landed && one.held;
+    }
+  }
+  EXPECT_GT(lost, 0);
+  EXPECT_GT(held, 0);
+}
+
+// Of two motions, one brings the object more surely to its place and the other turns it more surely: chosen
+// is the one that serves the tolerance that is tight.
+TEST(SkuValidation, TheMotionIsChosenByTheToleranceThatIsTight) {
+  LoggedMotions m(1, "batch180");
+  const auto answer = [&](double x, double theta) {
+    m.request.tolerance = {x, theta};
+    return validate_sku(bar(), card(), "card.json", m.request);
+  };
+  std::vector<ThrowCandidate> all = answer(100, 0.1).candidates;
+  std::erase_if(all, [](const auto& c) { return !c.held || !c.landed; });
+  std::string placed, turned;
+  for (const auto& a : all)
+    for (const auto& b : all)
+      if (a.linear.x < 0.95 * b.linear.x && a.linear.theta > 1.05 * b.linear.theta)
+        placed = a.condition, turned = b.condition;
+  ASSERT_FALSE(placed.empty()) << "of " << all.size();
+  std::erase_if(m.log.throws,
+                [&](const auto& one) { return one.condition != placed && one.condition != turned; });
+  EXPECT_EQ(answer(100, 0.1).reference().condition, turned);
+  EXPECT_EQ(answer(0.01, 1000).reference().condition, placed);
+}
+
 TEST(SkuValidation, MonteCarloAndDerivativesAgreeOnAPreciseObject) {
   const auto answer = validate_sku(bar(), card(), "card.json", quick(1000));
   EXPECT_TRUE(answer.agree) << answer.disagreement;
@@ -315,6 +431,13 @@ TEST(SkuValidation, MeasuredThrowsConfirmTheRightSkuAndContradictAWrongOne) {
   const auto close = validate_sku(bar(), gripper, "card.json", narrow);
   EXPECT_FALSE(close.measured->confirmed);
   EXPECT_NE(close.verdict, SkuVerdict::contradicted) << close.message;
+
+  // Hardly any landing is as near as a tenth of a millimetre, as foretold: no contradiction either.
+  auto strict = request;
+  strict.tolerance.x = 1e-4;
+  const auto as_foretold = validate_sku(bar(), gripper, "card.json", strict);
+  ASSERT_LT(as_foretold.measured->p_value, 0.05);
+  EXPECT_EQ(as_foretold.verdict, SkuVerdict::too_uncertain) << as_foretold.message;
 
   auto wrong = bar();
   wrong.com_offset = 0.07;  // thirty of its sigmas off

@@ -695,6 +695,52 @@ TEST(Improvement, OfALawIsJudgedWithoutDegreesOfFreedom) {
               1e-9);
 }
 
+// What an effect contributes is how far its sizes are from none, which is one for a ratio and zero for a
+// drag; a shape contributes nothing.
+TEST(Footprints, WhatAnEffectContributesIsCountedFromNone) {
+  FitResult fit;
+  for (const auto& [name, value] : {std::pair{"mu", 0.4},
+                                    {"contact.stribeck.mu_s/mu_k", 1.3},
+                                    {"contact.stribeck.v_s", 0.02},
+                                    {"flight.quadratic_drag.k[a]", 0.1}}) {
+    auto& u = fit.campaign.emplace_back();
+    u.unknown.name = name, u.value = value;
+  }
+  const auto of = [&](const char* id) { return contribution_of(fit, find_effect(id)); };
+  EXPECT_LT((of("contact.stribeck") - Eigen::Vector4d(0, 0.3, 0, 0)).norm(), 1e-12);
+  EXPECT_LT((of("flight.quadratic_drag") - Eigen::Vector4d(0, 0, 0, 0.1)).norm(), 1e-12);
+  fit.campaign[1].value = 1;
+  EXPECT_EQ(of("contact.stribeck").norm(), 0);
+}
+
+// An error that ends with the release ends at time zero, in all throws together, and not as the pads begin to
+// open.
+TEST(Residuals, TimeIsCountedFromEachThrowsRelease) {
+  const CampaignProblem problem(support::loop_campaign({}), "synthetic", {});
+  FitResult result;
+  std::vector<Eigen::VectorXd> residuals;
+  for (std::size_t i = 0; i < problem.throws().size(); ++i) {
+    const CampaignThrow& thrown = problem.throws()[i];
+    const double held = 0.02 + 0.002 * static_cast<double>(i);  // s, where no sensor saw the release
+    result.throws.emplace_back().detach = thrown.opening + held;
+    const double release = thrown.release_or(result.throws.back().detach);
+    auto& r = residuals.emplace_back(static_cast<Eigen::Index>(thrown.observed.all.size()));
+    for (std::size_t j = 0; j < thrown.observed.all.size(); ++j)
+      r[static_cast<Eigen::Index>(j)] = thrown.observed.all[j].time < release ? -3 : 2;
+  }
+  int samples = 0;
+  for (const ResidualBin& bin : residual_over_time(problem, result, residuals)) {
+    EXPECT_EQ(bin.mean, bin.time < 0 ? -3 : 2) << bin.time;
+    EXPECT_EQ(bin.rms, std::abs(bin.mean)) << bin.time;
+    samples += bin.n;
+  }
+  int flown = 0;
+  for (const CampaignThrow& thrown : problem.throws())
+    for (const auto& o : thrown.observed.all)
+      flown += phase_of(o, thrown.opening, HUGE_VAL) != Phase::landing;
+  EXPECT_EQ(samples, flown);
+}
+
 TEST(Footprints, TheStepOfTheTrueEffectIsItsSizeToFirstOrder) {
   constexpr double kTilt = 0.01;
   CampaignOptions options;

@@ -515,6 +515,23 @@ TEST(ThrowFit, AGripperThatOpensBeforeItIsToldToIsNoAnswerAndNoError) {
   }
 }
 
+// Nor is one whose numbers are none: a reading that is not finite, or a sigma of zero.
+TEST(ThrowFit, WhatIsNotFiniteIsNoAnswer) {
+  const auto problem = problem_of(disc_log());
+  const CampaignThrow& thrown = problem.throws().front();
+  const std::vector<double> own(problem.own().size(), 0.0);
+  auto unread = thrown.observed, certain = thrown.observed;
+  unread.all[3].value = NAN, certain.all[3].sigma = 0;
+  for (const auto by : {DerivativesBy::nothing, DerivativesBy::own, DerivativesBy::all}) {
+    EXPECT_TRUE(problem.linearise(thrown, problem.start(), own, by).solved);
+    for (const auto& observed : {unread, certain}) {
+      const auto l = problem.linearise(thrown.prepared, observed, problem.start(), own, by);
+      EXPECT_FALSE(l.solved);
+      EXPECT_THAT(l.why_not, HasSubstr("not finite"));
+    }
+  }
+}
+
 TEST(ThrowFit, RefusesOptionsThatMeanNothing) {
   const auto problem = problem_of(disc_log());
   const auto message = [&](auto&& change) {

@@ -78,6 +78,85 @@ TEST(WrenchBias, SlipsTheOtherWayShowTheOppositeBias) {
   EXPECT_LT((there.value + back.value).norm(), 1e-4);
 }
 
+/// The same slips, and once more as others.
+SlipSamples twice(SlipSamples slips) {
+  const auto samples = slips.samples;
+  const auto n = static_cast<int>(slips.slips.size());
+  for (SlipSample s : samples) s.slip += n, slips.samples.push_back(s);
+  for (int k = 0; k < n; ++k) slips.slips.push_back("again-" + std::to_string(k));
+  return slips;
+}
+
+// Twice the slips with the same scatter know a bias to half the variance, but that its three numbers were
+// fitted to them: of n slips, n − 3 degrees of freedom are left.
+TEST(WrenchBias, TakesThreeDegreesOfFreedomOfItsSlips) {
+  constexpr int kFew = 8;
+  const SlipSamples few = with_bias(ellipsoid(unequal_axes), kFew, 0.03, 6);
+  const WrenchBias once = fit_wrench_bias({few}, SurfaceModel::ellipsoid),
+                   again = fit_wrench_bias({twice(few)}, SurfaceModel::ellipsoid);
+  ASSERT_TRUE(once.solved && again.solved);
+  constexpr double kLeft = kFew - 3, kLeftOfTwice = 2 * kFew - 3;
+  for (Eigen::Index j = 0; j < 3; ++j)
+    EXPECT_NEAR(again.covariance(j, j) / once.covariance(j, j), kLeft / kLeftOfTwice, 0.03) << j;
+}
+
+// Slips one way only can hardly tell a bias from a surface that is larger. How sure it is, is what leaving
+// out one slip after the other says.
+TEST(WrenchBias, IsAsSureAsLeavingOutSlipsSays) {
+  SlipSamples one_way = with_bias(ellipsoid(unequal_axes), 100, 0.05, 8);
+  std::erase_if(one_way.samples, [](const SlipSample& s) { return s.wrench[0] < 0.5; });
+  const WrenchBias all = fit_wrench_bias({one_way}, SurfaceModel::ellipsoid);
+  ASSERT_TRUE(all.solved);
+  std::vector<Vector3d> without;
+  for (std::size_t i = 0; i < one_way.samples.size(); ++i) {
+    SlipSamples rest = one_way;
+    rest.samples.erase(rest.samples.begin() + static_cast<std::ptrdiff_t>(i));
+    const WrenchBias one = fit_wrench_bias({rest}, SurfaceModel::ellipsoid, all.value);
+    ASSERT_TRUE(one.solved);
+    without.push_back(one.value);
+  }
+  const auto n = static_cast<double>(without.size());
+  Vector3d mean = Vector3d::Zero(), squares = Vector3d::Zero();
+  for (const Vector3d& b : without) mean += b / n;
+  for (const Vector3d& b : without) squares += (b - mean).cwiseAbs2();
+  for (Eigen::Index j = 0; j < 3; ++j)
+    EXPECT_NEAR(std::sqrt(all.covariance(j, j) / (squares[j] * (n - 1) / n)), 1, 0.2) << j;
+}
+
+// Left-out slips are judged by their wrenches without the bias that the others show: as well as slips that
+// never had one.
+TEST(WrenchBias, SlipsThatAreLeftOutAreFreedOfItToo) {
+  const SlipSamples clean = simulate(ellipsoid(unequal_axes), 50, 0.02, 0.02, 9);
+  const auto score = [](const SlipSamples& slips) {
+    const WrenchBias whole = fit_wrench_bias({slips}, SurfaceModel::ellipsoid);
+    return score_with_bias({slips}, SurfaceModel::ellipsoid, whole, {}).at(0).mean_deg;
+  };
+  const double as_clean = score(clean);
+  EXPECT_LT(as_clean, 3);
+  EXPECT_NEAR(score(without_bias(clean, -sensor_bias)), as_clean, 0.2 * as_clean);
+}
+
+// Of five folds, the slips 0, 5, 10, ... are left out together: what one of them says, the others are not
+// predicted by.
+TEST(WrenchBias, SlipsHaveNoSayWhereTheyAreLeftOut) {
+  SlipSamples slips = with_bias(ellipsoid(unequal_axes), 50, 0.05, 10);
+  const WrenchBias whole = fit_wrench_bias({slips}, SurfaceModel::ellipsoid);
+  const auto errors = [&] {
+    return score_with_bias({slips}, SurfaceModel::ellipsoid, whole, {}).at(0).errors_deg;
+  };
+  const auto before = errors();
+  for (double& w : slips.samples[5].wrench) w *= 1.5;
+  const auto after = errors();
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    if (i == 5) continue;
+    if (i % 5 == 0) {
+      EXPECT_EQ(after[i], before[i]) << i;
+    } else {
+      EXPECT_NE(after[i], before[i]) << i;
+    }
+  }
+}
+
 TEST(WrenchBias, IsNamedWhereItIsAndNowhereElse) {
   const auto found =
       discover_surfaces(std::vector{with_bias(ellipsoid(unequal_axes), 50, 0.15, 4)}, one_draw());
