@@ -481,5 +481,25 @@ TEST(ThrowStudy, SumsUpItsRecord) {
   EXPECT_NEAR(run.rms_error.front(), std::sqrt(squares / counted), 0.02 * run.rms_error.front());
 }
 
+// In the joints, too, a hand that is held harder against turning gives way less to its load.
+TEST(ThrowStudy, JointsFeelTheStiffnessAgainstTurning) {
+  const auto lag = [](double rotational) {
+    StudyOptions once = ideal();
+    once.repetitions = 0;
+    return run_throw({"joints", 30, rotational, false, true}, {"object", 0.4, 0.05}, once, 1)
+        .release_position_error;
+  };
+  EXPECT_LT(lag(40), 0.7 * lag(10));
+}
+
+// What the estimate takes off the load that is not known is no error any more: V falls with the learning.
+TEST(ThrowStudy, LyapunovsFunctionFallsAsTheLoadIsLearned) {
+  StudyOptions o = ideal();
+  o.repetitions = 2;
+  const StudyThrow run = run_throw({"adaptive", 30, 10, true}, {"object", 0.4, 0.05}, o, 1, true);
+  ASSERT_GT(run.history.back().mass_estimate, 0.8 * 0.4);
+  EXPECT_LT(run.history.back().lyapunov, 0.9 * run.history.front().lyapunov) << "what no motion shows stays";
+}
+
 }  // namespace
 }  // namespace unhand::planners::control
