@@ -609,7 +609,7 @@ TEST(UnitCheck, FlightsContradictAWrongLandingHeight) {
     const std::string said = "land at ";
     ASSERT_THAT(told.reason, HasSubstr(said));
     EXPECT_NEAR(std::stod(told.reason.substr(told.reason.find(said) + said.size())),
-                campaign().landing_height, 0.02);
+                campaign().landing_height, 0.004);
     for (auto& one : log.throws) one.mocap.reset();  // then nothing does
     EXPECT_THAT(unit_doubts(log), IsEmpty());
   }
