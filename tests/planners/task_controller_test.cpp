@@ -469,6 +469,9 @@ TEST(ThrowStudy, ThrowsToTheSideAsItThrowsAhead) {
     const Eigen::Vector2d b = Eigen::Rotation2Dd(-turn) * throw_once_with(aside, 0.4).miss;
     EXPECT_LT((b - a).norm(), 0.1 * std::abs(a.x())) << turn;  // the hand is not turned along
   }
+  StudyOptions behind = ahead;  // where joint 1 does not turn
+  behind.start.x() = -ahead.start.x();
+  EXPECT_THROW(throw_once_with(behind, 0.4), std::invalid_argument);
 }
 
 // The record's errors over the throwing part of a repetition are those that the run sums up.
