@@ -47,6 +47,13 @@ Joints pose_at(const Chain& arm, const Eigen::Vector3d& p, const Eigen::Matrix3d
     throw std::invalid_argument(
         fmt::format("throw study: the tip does not reach ({:.3g}, {:.3g}, {:.3g}) m: it stays {:.2g} m away",
                     p.x(), p.y(), p.z(), off));
+  for (int i = 0; i < arm.size(); ++i) {
+    const Joint& joint = arm.joints[static_cast<std::size_t>(i)];
+    if (!(q[i] >= joint.limits.lower && q[i] <= joint.limits.upper))
+      throw std::invalid_argument(
+          fmt::format("throw study: at ({:.3g}, {:.3g}, {:.3g}) m {} is at {:.3g} rad, beyond its limits",
+                      p.x(), p.y(), p.z(), joint.name, q[i]));
+  }
   return q;
 }
 
@@ -191,8 +198,9 @@ class Run {
     for (int i = 0; i < 7; ++i)
       robot_.friction_scale[i] = std::max(0.0, 1 + options.friction_error * normal());
     constexpr double pi = std::numbers::pi;
-    const Joints rest =
-        pose_at(known_, options.start, orientation_, Joints{{0, -pi / 4, 0, -3 * pi / 4, 0, pi / 2, pi / 4}});
+    const double aside = std::atan2(options.start.y(), options.start.x());  // and the hand turned back
+    const Joints rest = pose_at(known_, options.start, orientation_,
+                                Joints{{aside, -pi / 4, 0, -3 * pi / 4, 0, pi / 2, pi / 4 + aside}});
     robot_.q = rest;
     gains_ = gains_of(choice, known_, rest);
     joint_gains_ = {felt_stiffness(choice, jacobian<double>(known_, rest)), gains_.damping};

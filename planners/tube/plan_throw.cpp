@@ -149,6 +149,18 @@ bool add_motion(const Chain& chain, const JointVector<double>& home, const PlanO
   return false;
 }
 
+/// Braking begins with the acceleration of the window, and adds to its velocity: takes what that is beyond a
+/// joint's limit off what the window's end may have of it, once for each joint and where it is little.
+bool leave_room(const LimitUse& velocity, const Chain& chain, Chain& allowed) {
+  constexpr double kLittle = 1.05;
+  if (!(velocity.fraction > 1 && velocity.fraction <= kLittle)) return false;
+  const auto joint = static_cast<std::size_t>(velocity.joint);
+  double& limit = allowed.joints[joint].limits.velocity;
+  if (limit < chain.joints[joint].limits.velocity) return false;
+  limit /= velocity.fraction;
+  return true;
+}
+
 /// Why the search found nothing: by what it finds without one demand or another.
 std::string why_no_throw(const Chain& chain, const TargetBox& box, NominalOptions search) {
   search.refined = 0;
@@ -184,39 +196,45 @@ PlanResult plan_throw(const Chain& chain, const TargetBox& box, const PlanOption
   if (throws.empty()) out.reason = why_no_throw(chain, box, options.search);
   for (const NominalThrow& nominal : throws) {
     ++out.tried;
-    const TubeProblem problem{chain, nominal.state, box.middle, options.search.window, options.search.medium};
-    ThrowPlan plan;
-    plan.nominal = nominal;
-    plan.tube = solve_tube(problem);
-    std::string reason = plan.tube.reason;
-    const bool first = out.outcome == PlanOutcome::no_throw;
-    if (plan.tube.outcome == TubeOutcome::solved) {
-      plan.qdd = options.refine ? refine_tube(problem, plan.tube.qdd) : plan.tube.qdd;
-      const auto landings = [&](const JointVector<double>& qdd) {
-        return landings_over_window(problem, qdd, kLandingSamples);
-      };
-      plan.at_rest = landings(JointVector<double>::Zero(chain.size()));
-      plan.tube_landings = landings(plan.tube.qdd);
-      plan.landings = landings(plan.qdd);
-      const bool inside = std::all_of(plan.landings.begin(), plan.landings.end(),
-                                      [&](const LandingAt& at) { return at.lands && box.holds(at.x, at.y); });
-      if (inside) {
-        if (add_motion(chain, home, options, plan, reason)) {
-          out.outcome = PlanOutcome::planned;
-          out.reason.clear();
-          out.plan = std::move(plan);
-          return out;
+    Chain allowed = chain;  // at the window's end
+    for (bool again = true; std::exchange(again, false);) {
+      const TubeProblem problem{allowed, nominal.state, box.middle, options.search.window,
+                                options.search.medium};
+      ThrowPlan plan;
+      plan.nominal = nominal;
+      plan.tube = solve_tube(problem);
+      std::string reason = plan.tube.reason;
+      const bool first = out.outcome == PlanOutcome::no_throw;
+      if (plan.tube.outcome == TubeOutcome::solved) {
+        plan.qdd = options.refine ? refine_tube(problem, plan.tube.qdd) : plan.tube.qdd;
+        const auto landings = [&](const JointVector<double>& qdd) {
+          return landings_over_window(problem, qdd, kLandingSamples);
+        };
+        plan.at_rest = landings(JointVector<double>::Zero(chain.size()));
+        plan.tube_landings = landings(plan.tube.qdd);
+        plan.landings = landings(plan.qdd);
+        const bool inside = std::all_of(plan.landings.begin(), plan.landings.end(), [&](const LandingAt& at) {
+          return at.lands && box.holds(at.x, at.y);
+        });
+        if (inside) {
+          if (add_motion(chain, home, options, plan, reason)) {
+            out.outcome = PlanOutcome::planned;
+            out.reason.clear();
+            out.plan = std::move(plan);
+            return out;
+          }
+          if (out.outcome != PlanOutcome::no_motion) out.reason = reason;
+          out.outcome = PlanOutcome::no_motion;
+          again = leave_room(plan.limits.velocity, chain, allowed);
+          continue;
         }
-        if (out.outcome != PlanOutcome::no_motion) out.reason = reason;
-        out.outcome = PlanOutcome::no_motion;
-        continue;
+        reason = fmt::format("the window's landings miss the middle by up to {:.3f} m",
+                             largest_miss(plan.landings));
       }
-      reason =
-          fmt::format("the window's landings miss the middle by up to {:.3f} m", largest_miss(plan.landings));
-    }
-    if (first) {
-      out.outcome = PlanOutcome::no_tube;
-      out.reason = reason;
+      if (first) {
+        out.outcome = PlanOutcome::no_tube;
+        out.reason = reason;
+      }
     }
   }
   return out;

@@ -285,13 +285,15 @@ TEST_F(Cli, MissingGnuplotIsSaid) {
 TEST_F(Cli, BrokenGnuplotLeavesNothing) {
   fs::create_directory(folder / "bin");
   std::ofstream(folder / "bin/gnuplot") << "#!/bin/sh\necho 'no terminal for you' >&2\nexit 1\n";
+  std::ofstream(folder / "a.json") << "the old one";
   fs::permissions(folder / "bin/gnuplot", fs::perms::owner_all);
   const Answer answer =
       run("compare " + quick + " --models gripper_delay --report r --json a.json --write-cards c",
           "PATH='" + (folder / "bin").string() + "':$PATH");
   EXPECT_EQ(answer.code, 1);
   EXPECT_THAT(answer.err, HasSubstr("no terminal for you"));
-  EXPECT_THAT(files(), testing::ElementsAre("bin", "bin/gnuplot"));
+  EXPECT_THAT(files(), testing::ElementsAre("a.json", "bin", "bin/gnuplot"));
+  EXPECT_EQ(content(folder / "a.json"), "the old one");
 }
 
 TEST_F(Cli, CardsCarryAnEstimate) {
@@ -510,6 +512,72 @@ TEST_F(Cli, CompareSumsUpItsThrows) {
           EXPECT_THAT(report.substr(report.find("## Bias")), HasSubstr(bias.str()));
         }
       }
+}
+
+// Some throws of each split never come down to a table as high as half of them fly.
+TEST_F(Cli, CompareCountsWhatDoesNotLandBySplit) {
+  auto log = datasets::read_throw_log(quick);
+  std::vector<double> peaks;
+  for (auto& one : log.throws) {
+    one.landing.reset();
+    double& peak = peaks.emplace_back(-1);
+    for (std::size_t i = 0; i < one.mocap->pose.rows; ++i)
+      if (one.mocap->is_valid(i)) peak = std::max(peak, one.mocap->pose(i, 1));
+  }
+  for (auto& one : log.throws) one.split = datasets::Split::train;
+  const auto sorted = [&] {
+    auto out = peaks;
+    std::sort(out.begin(), out.end());
+    return out;
+  }();
+  log.landing_height = 0.5 * (sorted[3] + sorted[4]);  // four do not reach it: one of the test, three others
+  int low = 0, high = 0;
+  for (std::size_t k = 0; k < log.throws.size(); ++k) {
+    int& of = peaks[k] < log.landing_height ? low : high;
+    if (of++ < (peaks[k] < log.landing_height ? 1 : 2)) log.throws[k].split = datasets::Split::test;
+  }
+  datasets::write_throw_log(folder / "high.h5", log);
+  const Answer answer = run("compare high.h5 --models limit_surface_disc --json c.json --report r");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  const json model = read_json(folder / "c.json")["models"]["limit_surface_disc"];
+  std::map<std::string, int> failed;
+  std::istringstream lines(content(folder / "r/throws.csv"));
+  for (std::string line; std::getline(lines, line);)
+    for (const std::string split : {"train", "test"})
+      failed[split] += line.find("," + split + ",limit_surface_disc,never_reaches,") != std::string::npos;
+  EXPECT_EQ(failed["train"], 3);
+  EXPECT_EQ(failed["test"], 1);
+  for (const char* split : {"train", "test"}) {
+    EXPECT_EQ(model[split]["failed"], failed[split]) << split;
+    EXPECT_THAT(answer.out, testing::ContainsRegex(fmt::format("limit_surface_disc +{} +{} +{} ", split,
+                                                               model[split]["n"].get<int>(), failed[split])));
+  }
+  EXPECT_EQ(model["failed"], 4);
+}
+
+// Of throws of one condition the mean landing is not known otherwise: each takes one off the number of them.
+TEST_F(Cli, TheScatterOfRepetitionsIsThatOfTheLogsLandings) {
+  const auto log = datasets::read_throw_log(quick);
+  std::map<std::string, std::vector<const datasets::Throw*>> conditions;
+  for (const auto& one : log.throws) conditions[one.condition].push_back(&one);
+  double squares[2]{}, freedom = 0;
+  for (const auto& [name, throws] : conditions) {
+    freedom += static_cast<double>(throws.size()) - 1;
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      double mean = 0;
+      for (const auto* one : throws) mean += one->landing->pose(0, axis) / static_cast<double>(throws.size());
+      for (const auto* one : throws) squares[axis] += std::pow(one->landing->pose(0, axis) - mean, 2);
+    }
+  }
+  const double x = std::sqrt(squares[0] / freedom),
+               theta = std::sqrt(squares[1] / freedom) * 180 / std::numbers::pi;
+  const Answer answer = run("compare " + quick + " --models sliding_pivot --json c.json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  const json scatter = read_json(folder / "c.json")["repetition_scatter"];
+  EXPECT_EQ(scatter["conditions"], conditions.size());
+  EXPECT_NEAR(scatter["landing_x_m"].get<double>(), x, 1e-9);
+  EXPECT_NEAR(scatter["landing_theta_deg"].get<double>(), theta, 1e-7);
+  EXPECT_THAT(answer.out, HasSubstr(fmt::format("landing x {:.4f} m, landing theta {:.2f} deg", x, theta)));
 }
 
 }  // namespace

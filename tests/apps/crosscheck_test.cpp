@@ -1,4 +1,6 @@
 // crosscheck: other engines on a log's throws.
+#include <fmt/format.h>
+
 #include <array>
 #include <tuple>
 
@@ -42,11 +44,14 @@ TEST_F(Cli, CrosscheckWithPointsComesNearTheExactDisc) {
 
 /// A fitted card, as far as it goes. It says that throws do not differ, so that predict takes every grasp as
 /// prepared.
-void write_fitted_card(const fs::path& file, const std::string& model, const std::string& parameters) {
+void write_fitted_card(const fs::path& file, const std::string& model, const std::string& parameters,
+                       double mu = 0.5, int pads = 2) {
   std::ofstream(file) << R"({"schema": "model-card", "schema_version": 1, "model": ")" << model
                       << R"(", "library_version": "0", "log": {"file": "made by a test"}, "parameters": {
-    "mu": {"value": 0.5, "sigma": 0.01, "unit": "-"}, "length": {"value": 0.007, "unit": "m"},
-    "pads": {"value": 2, "unit": "-"}, "reference_force": {"value": 50, "unit": "N"})"
+    "mu": {"value": )" << mu
+                      << R"(, "sigma": 0.01, "unit": "-"}, "length": {"value": 0.007, "unit": "m"},
+    "pads": {"value": )"
+                      << pads << R"(, "unit": "-"}, "reference_force": {"value": 50, "unit": "N"})"
                       << parameters << R"(}, "own_spreads": {"mu_deviation": {"sigma": 1e-9, "unit": "-"},
     "grasp_angle": {"sigma": 1e-9, "unit": "rad"}, "grasp_offset": {"sigma": 1e-9, "unit": "m"},
     "dead_time_deviation": {"sigma": 1e-9, "unit": "s"}, "force_deviation": {"sigma": 1e-9, "unit": "-"}}})";
@@ -237,6 +242,65 @@ TEST_F(Cli, CrosscheckOpensThePadsAsTheCardSays) {
   write_fitted_card(folder / "silent.json", "limit_surface", "");
   expect_refusal("crosscheck bare.h5 --engine cvode --card silent.json", 3,
                  "/parameters/grip_force: is missing: throws without a measured normal force");
+}
+
+// One pad of twice the friction holds as two do, four of half of it as well.
+TEST_F(Cli, CrosscheckTakesTheNumberOfPadsFromItsCard) {
+  for (const std::string engine : {"cvode", "patch --rings 1"}) {
+    std::vector<std::vector<double>> found;
+    for (const int pads : {1, 2, 4}) {
+      write_fitted_card(folder / "card.json", "limit_surface", "", 1.0 / pads, pads);
+      const Answer answer = run("crosscheck " + quick +
+                                " --models limit_surface --card card.json --json c.json --engine " + engine);
+      ASSERT_EQ(answer.code, 0) << answer.err;
+      json checked = read_json(folder / "c.json");
+      EXPECT_EQ(checked["parameters"]["pads"], pads);
+      found.push_back(landings_of(checked["settings"][0]["throws"]));
+      ASSERT_EQ(found.back().size(), found.front().size());
+    }
+    ASSERT_GT(found.front().size(), 9u) << engine;
+    for (std::size_t i = 0; i < found.front().size(); ++i)
+      for (const auto& other : found) EXPECT_NEAR(other[i], found.front()[i], 1e-9) << engine;
+  }
+}
+
+// An engine flies its objects on with the drag that they declare; the text has the numbers of the JSON.
+TEST_F(Cli, CrosscheckFliesWithTheDragOfTheObjects) {
+  write_once_each(quick, folder / "calm.h5");
+  auto log = datasets::read_throw_log(folder / "calm.h5");
+  for (auto& [name, object] : log.objects) object.drag_k = 0.3;
+  datasets::write_throw_log(folder / "air.h5", log);
+  write_fitted_card(folder / "card.json", "limit_surface_disc", "");
+  const auto landings = [&](const std::string& file) {
+    const Answer answer = run("crosscheck " + file +
+                              " --engine patch --models limit_surface_disc --card card.json --json c.json");
+    EXPECT_EQ(answer.code, 0) << answer.err;
+    json setting = read_json(folder / "c.json")["settings"][0];
+    EXPECT_EQ(setting["setting"]["step_s"].get<double>(), 4e-5) << "as docs/crosscheck.md has it";
+    json& model = setting["models"]["limit_surface_disc"];
+    EXPECT_LT(model["landing_x_m"]["mae"].get<double>(), 5e-3) << file;
+    std::string row = "measured";
+    for (const char* quantity : {"detach_vx_m_s", "detach_omega_deg_s", "landing_x_m", "landing_theta_deg"})
+      row += fmt::format(" +{:.4f}", setting["measured"][quantity]["mae"].get<double>());
+    EXPECT_THAT(answer.out, testing::ContainsRegex(row));
+    return landings_of(setting["throws"]);
+  };
+  const auto calm = landings("calm.h5"), air = landings("air.h5");
+  ASSERT_EQ(calm.size(), 6u);
+  ASSERT_EQ(air.size(), 6u);
+  double shorter = 0;
+  for (std::size_t i = 0; i < 6; ++i) shorter = std::max(shorter, std::abs(calm[i] - air[i]));
+  EXPECT_GT(shorter, 0.03);
+}
+
+TEST_F(Cli, CrosscheckSaysThatNothingLands) {
+  auto log = datasets::read_throw_log(quick);
+  for (auto& one : log.throws) one.landing.reset();
+  log.landing_height = 1.5;
+  datasets::write_throw_log(folder / "roof.h5", log);
+  for (const std::string engine : {"cvode", "patch"})
+    expect_refusal("crosscheck roof.h5 --models limit_surface --json c.json --engine " + engine, 1,
+                   "roof.h5: " + engine + " brings no throw to a landing");
 }
 
 TEST_F(Cli, CrosscheckRefuses) {

@@ -177,6 +177,45 @@ TEST_F(Cli, FitThenPredict) {
   expect_refusal("predict " + quick + " --card bad.json", 3, "bad.json: /model");
 }
 
+/// A card whose friction alone is uncertain.
+void write_card_of_mu(const fs::path& file, double mu) {
+  std::ofstream(file) << fmt::format(
+      R"({{"schema": "model-card", "schema_version": 1, "model": "limit_surface", "library_version": "0",
+      "log": {{"file": "made by a test"}}, "parameters": {{"mu": {{"value": {}, "sigma": 0.01, "unit": "-"}},
+      "length": {{"value": 0.007, "unit": "m"}}, "pads": {{"value": 2, "unit": "-"}},
+      "reference_force": {{"value": 50, "unit": "N"}}}},
+      "own_spreads": {{"mu_deviation": {{"sigma": 1e-9, "unit": "-"}},
+      "grasp_angle": {{"sigma": 1e-9, "unit": "rad"}}, "grasp_offset": {{"sigma": 1e-9, "unit": "m"}},
+      "dead_time_deviation": {{"sigma": 1e-9, "unit": "s"}},
+      "force_deviation": {{"sigma": 1e-9, "unit": "-"}}}}}})",
+      mu);
+}
+
+// To first order an outcome scatters by its derivative with respect to what is uncertain, times the sigma.
+TEST_F(Cli, ThePredictedSigmasAreThoseOfTheFriction) {
+  const auto predicted = [&](double mu) {
+    write_card_of_mu(folder / "card.json", mu);
+    EXPECT_EQ(run("predict " + quick + " --card card.json --json p.json").code, 0);
+    return read_json(folder / "p.json")["throws"];
+  };
+  constexpr double kApart = 1e-3;
+  json throws = predicted(0.5), more = predicted(0.5 + kApart), less = predicted(0.5 - kApart);
+  ASSERT_EQ(throws.size(), 12u);
+  for (std::size_t k = 0; k < 12; ++k)
+    for (const auto& [name, where, key] : {std::tuple{"detach_vx_m_s", "detach", "vx_m_s"},
+                                           {"detach_vz_m_s", "detach", "vz_m_s"},
+                                           {"detach_omega_deg_s", "detach", "omega_deg_s"},
+                                           {"landing_x_m", "landing", "x_m"},
+                                           {"landing_theta_deg", "landing", "theta_deg"},
+                                           {"flight_time_s", "landing", "flight_time_s"}}) {
+      const double slope =
+          (more[k][where][key].get<double>() - less[k][where][key].get<double>()) / (2 * kApart);
+      EXPECT_NEAR(throws[k]["sigma"][name].get<double>(), std::abs(0.01 * slope),
+                  1e-3 * std::abs(0.01 * slope) + 1e-7)
+          << name << " of " << throws[k]["id"];
+    }
+}
+
 // What ends a throw without a landing is told in words; JSON has its name.
 TEST_F(Cli, ThrowsThatDoNotLandAreToldInWords) {
   ASSERT_EQ(run("fit " + quick + " --model limit_surface_disc --card c.json").code, 0);
@@ -329,7 +368,11 @@ TEST_F(Cli, CompareFitsTheModels) {
   for (const char* name : {"mu", "length"})
     EXPECT_EQ(models["limit_surface_naive"]["parameters"][name], models["limit_surface"]["parameters"][name]);
   EXPECT_LT(models["limit_surface"]["test"]["landing_x_m"]["mae"].get<double>(), 0.01);
-  EXPECT_TRUE(read_json(folder / "c/limit_surface.json").contains("covariance"));
+  json card = read_json(folder / "c/limit_surface.json");
+  EXPECT_TRUE(card.contains("covariance"));
+  for (const auto& [name, sigma] : models["limit_surface"]["parameter_sigmas"].items())
+    EXPECT_EQ(sigma, card["parameters"][name]["sigma"]) << name;
+  EXPECT_EQ(models["limit_surface"]["parameter_sigmas"].size(), models["limit_surface"]["parameters"].size());
 }
 
 }  // namespace

@@ -144,6 +144,28 @@ TEST_F(Cli, PlansAThrowWithTheMassAndTheDragOfItsSku) {
   EXPECT_THAT(noted.err, HasSubstr("--drag 0.05 is taken, not drag_k_per_m = 0.1 of blunt.toml"));
 }
 
+// An object 10 cm from the pads is where one in the middle of 10 cm longer pads is: one and the same plan.
+TEST_F(Cli, AnObjectWeighsWhereItHangs) {
+  const auto planned = [&](const std::string& gripper, const std::string& com_offset) {
+    std::ofstream(folder / "block.toml") << "name='block'\nsurface='paper'\nmass_kg=1.5\n"
+                                            "inertia_kg_m2=0.02\ncom_offset_m="
+                                         << com_offset << "\n";
+    const Answer answer =
+        run("plan throw --target 1.3,0,-0.2 --samples 100 --draws 20 --gripper-mass 0 --sku "
+            "block.toml --json p.json --gripper " +
+            gripper);
+    EXPECT_EQ(answer.code, 0) << answer.err;
+    return read_json(folder / "p.json");
+  };
+  const json hanging = planned("0.15", "0.1"), reaching = planned("0.25", "0.0");
+  EXPECT_EQ(hanging["qd0_rad_s"], reaching["qd0_rad_s"]);
+  for (const char* limit : {"velocity", "jerk", "torque"})
+    EXPECT_NEAR(hanging["limits"][limit]["fraction"].get<double>(),
+                reaching["limits"][limit]["fraction"].get<double>(), 1e-9)
+        << limit;
+  EXPECT_GT(hanging["limits"]["torque"]["fraction"], 0.5);
+}
+
 TEST_F(Cli, PlansAThrowWithACard) {
   ASSERT_EQ(run("compare " + quick + " --models sliding_pivot --write-cards cards").code, 0);
   std::ofstream(folder / "bar.toml") << "name='bar'\nsurface='paper'\nmass_kg=0.246\ncom_offset_m=0.14\n"
@@ -271,7 +293,8 @@ void expect_trajectories(const std::string& csv, const std::string& of) {
 
 // What the motors put in and no loss takes is in the arm: the spring lends it, and throws with it are faster.
 TEST_F(Cli, AClutchedSpringThrowsFaster) {
-  const Answer answer = run("plan elastic --starts 1 --intervals 8 --longest 0.4 --json e.json --report out");
+  const Answer answer =
+      run("plan elastic --starts 1 --intervals 8 --longest 0.4 --elevation 20 --json e.json --report out");
   ASSERT_EQ(answer.code, 0) << answer.err;
   json drives = read_json(folder / "e.json")["drives"];
   for (auto& [name, drive] : drives.items()) {
@@ -308,6 +331,8 @@ TEST_F(Cli, AClutchedSpringThrowsFaster) {
   EXPECT_NEAR(std::hypot(vx, vz), drives["rigid"]["basins"].back()["resimulated_speed_m_s"].get<double>(),
               1e-6);
 
+  EXPECT_NEAR(std::atan2(vz, vx), std::numbers::pi / 9, 0.01) << "as asked for";
+
   // What the drawn motions use of the limits is what is told: 8 N m/rad, and limits as
   // docs/elastic-throwing.md has them.
   const auto drawn = blocks_of(folder / "out/speed.dat");
@@ -343,9 +368,9 @@ TEST_F(Cli, AClutchedSpringThrowsFaster) {
 
 TEST_F(Cli, ElasticThrowsReachTheirTargets) {
   const Answer answer = run(
-      "plan elastic --target 2.2 --starts 2 --intervals 8 --nodes 4 --checks 9 --json e.json --report out");
+      "plan elastic --target 2.2 --starts 2 --intervals 8 --nodes 4 --checks 7 --json e.json --report out");
   ASSERT_EQ(answer.code, 0) << answer.err;
-  EXPECT_THAT(answer.out, HasSubstr("9 land in the box of 0.5 m"));
+  EXPECT_THAT(answer.out, HasSubstr("7 land in the box of 0.5 m"));
   json found = read_json(folder / "e.json");
   ASSERT_EQ(found["nodes"].size(), 4u);
   // The run's last row, thrown without drag to 0.5 m below the shoulder, lands where the node says.
@@ -368,13 +393,13 @@ TEST_F(Cli, ElasticThrowsReachTheirTargets) {
                 HasSubstr(fmt::format("{:+.2f}", 1e3 * node["resimulated_miss_m"].get<double>())));
   // The dense check, of which the figure has every target.
   const auto checks = blocks_of(folder / "out/table.dat").at("dense check");
-  ASSERT_EQ(checks.size(), 9u);
-  EXPECT_EQ(found["check"]["targets"], 9);
+  ASSERT_EQ(checks.size(), 7u);
+  EXPECT_EQ(found["check"]["targets"], 7);
   double worst = 0, use = 0;
   for (const auto& row : checks) worst = std::max(worst, std::abs(row[1]) / 1e3), use = std::max(use, row[2]);
   EXPECT_NEAR(found["check"]["worst_miss_m"].get<double>(), worst, 1e-12);
   EXPECT_NEAR(found["check"]["largest_limit_use"].get<double>(), use, 1e-12);
-  EXPECT_EQ(found["check"]["hits"], 9);
+  EXPECT_EQ(found["check"]["hits"], 7);
   EXPECT_NEAR(checks.front()[0], 1.8, 1e-12);
   EXPECT_NEAR(checks.back()[0], 2.6, 1e-12);
 
@@ -416,6 +441,9 @@ TEST_F(Cli, AnElasticWristThrowsFaster) {
   for (std::size_t k = 0; k < 2; ++k) {
     const double stiffness = k == 0 ? 4 : 16;
     EXPECT_NEAR(drawn[k][2], wrist["spring"][k]["gain"].get<double>(), 1e-9);
+    const double planned = wrist["spring"][k]["planned_m_s"], made = wrist["spring"][k]["speed_m_s"];
+    EXPECT_THAT(answer.out, HasSubstr(fmt::format("  {:.3f}    {:.3f}  ", made, planned)));
+    EXPECT_NE(planned, made) << "between its few nodes the plan is not quite the arm's motion";
     double most = 0;  // J, over the run
     for (std::size_t i = 0; i < columns.at("deflection_rad").size(); ++i)
       if (columns.at("stiffness_n_m_rad")[i] == fmt::to_string(static_cast<int>(stiffness)))
@@ -423,6 +451,7 @@ TEST_F(Cli, AnElasticWristThrowsFaster) {
     EXPECT_NEAR(wrist["spring"][k]["stored_J"].get<double>(), most, 0.02 * most);
     EXPECT_NEAR(drawn[k][3], wrist["spring"][k]["stored_J"].get<double>(), 1e-9);
   }
+  EXPECT_GT(std::abs(drawn[1][1] - drawn[0][1]), 0.1) << "another spring makes another throw";
   const std::size_t best = drawn[1][1] > drawn[0][1];
   EXPECT_THAT(answer.out, HasSubstr(fmt::format("best stiffness {:.2f} N m/rad", drawn[best][0])));
 }
@@ -588,6 +617,26 @@ TEST_F(Cli, ThrowFlipRefusesWhatItCannotDo) {
   EXPECT_THAT(far.err, HasSubstr("note: out of reach of the robot as declared"));
 }
 
+// Robot 1 throws two of three into the tolerances at once, and all of them the next time.
+TEST_F(Cli, ThrowFlipTellsTwoThirdsFromAll) {
+  const Answer answer = run("plan flip --target 1.2,180 --seed 1 --iterations 3 --learner m1 --json f.json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  const json flip = read_json(folder / "f.json");
+  int two_thirds = 0, all = 0, iteration = 0;
+  for (const auto& one : flip["iterations"]) {
+    ++iteration;
+    if (two_thirds == 0 && one["hits"] >= 2) two_thirds = iteration;
+    if (all == 0 && one["hits"] == 3) all = iteration;
+  }
+  ASSERT_LT(two_thirds, all) << "or this is no test of it";
+  ASSERT_GT(two_thirds, 0);
+  EXPECT_EQ(flip["iterations_to_two_thirds"], two_thirds);
+  EXPECT_EQ(flip["iterations_to_all"], all);
+  EXPECT_THAT(answer.out,
+              HasSubstr(fmt::format("at least 2 of 3 first in iteration {}, all 3 first in iteration {}\n",
+                                    two_thirds, all)));
+}
+
 TEST_F(Cli, ValidateSkuAnswersWithABudget) {
   std::ofstream(folder / "bar.toml") << "name = 'bar-com100'\nmass_kg = 0.246\ncom_offset_m = 0.10\n"
                                         "inertia_kg_m2 = 3.3e-3\nsurface = 'printed'\n";
@@ -637,6 +686,16 @@ TEST_F(Cli, ValidateSkuAnswersWithABudget) {
                                  fmt::format("{:.1f} %", 100 * of("share"))}));
   }
   EXPECT_NEAR(out["linear"]["landing_theta_deg"].get<double>(), std::sqrt(square), 1e-9);
+  const Answer narrow =
+      run("validate-sku bar.toml --card card.json --samples 200 --json n.json --tolerance 0.005,1");
+  json spreads = read_json(folder / "n.json");
+  for (const auto& [name, key] : {std::pair{"Monte Carlo", "monte_carlo"}, {"derivatives", "linear"}}) {
+    const auto of = [&, &spread = spreads[key]](const char* what) { return spread[what].get<double>(); };
+    EXPECT_THAT(narrow.out, row({name, fmt::format("{:.2f}", 100 * of("landing_x_m")),
+                                 fmt::format("{:.2f} .*", of("landing_theta_deg")),
+                                 fmt::format("{:.1f} %", 100 * of("within"))}));
+  }
+  EXPECT_NE(spreads["monte_carlo"]["within"], spreads["linear"]["within"]) << "drawn, and of a normal one";
   for (const auto& one : judged["candidates"])
     EXPECT_THAT(with_log.out, row({one["condition"].get<std::string>().substr(0, 20) + ".*",
                                    fmt::format("{:.2f}", 100 * one["sigma_x_m"].get<double>()),
@@ -903,6 +962,73 @@ TEST_F(Cli, AThrowWithACardKnowsItsAirAndItsGripper) {
   EXPECT_NEAR(told["window_s"].get<double>(), 0.06 + 0.06 + 4 * std::hypot(0.003, 0.004), 1e-12);
   EXPECT_LT(std::abs(told["release"]["contact_model"]["miss_m"].get<double>()), 0.03);
   EXPECT_LT(std::abs(told["predicted"][told["motion"].get<std::string>()]["mean_m"].get<double>()), 0.03);
+}
+
+// Where its centre of mass is between the pads, it flies as one that is carried rigidly, in thick air too.
+TEST_F(Cli, TheCardsReleaseFliesInTheSameAirAsThePlan) {
+  write_pivot_card(folder / "card.json", 80, 0.03);
+  write_bar(folder / "bar.toml", 0.25, 0.0);
+  const Answer answer =
+      run("plan throw --target 1.1,0,0 --samples 600 --draws 20 --drag 0.3 --card card.json "
+          "--sku bar.toml --json p.json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  json told = read_json(folder / "p.json");
+  const double due = told["release"]["contact_model"]["detach_time_s"],
+               mean = told["predicted"][told["motion"].get<std::string>()]["mean_m"];
+  const json& window = told["window_landings"]["planned"];
+  int near = 0;
+  for (std::size_t k = 0; k < window["time_s"].size(); ++k) {
+    if (std::abs(window["time_s"][k].get<double>() - due) > 0.011) continue;
+    ++near;
+    EXPECT_NEAR(window["forward_m"][k].get<double>(), mean, 0.01);
+  }
+  EXPECT_GE(near, 3);
+}
+
+// The plan turns with its target about the vertical, and what it asks of the card with it.
+TEST_F(Cli, TheSpeedsOfARelease) {
+  write_pivot_card(folder / "card.json", 80, 0.03);
+  json card = read_json(folder / "card.json");
+  card["valid_range"]["release_speed"] = {{"low", 50}, {"high", 60}, {"unit", "m/s"}};
+  card["valid_range"]["release_omega"] = {{"low", 50}, {"high", 60}, {"unit", "rad/s"}};
+  std::ofstream(folder / "tried.json") << card;
+  write_bar(folder / "bar.toml", 0.25, 0.1);
+  for (const char* target : {"1,0,-0.2", "0,1,-0.2", "-0.6,-0.8,-0.2"}) {
+    const Answer answer =
+        run("plan throw --samples 100 --draws 20 --card tried.json --sku bar.toml --json "
+            "p.json --target=" +
+            std::string(target));
+    ASSERT_EQ(answer.code, 0) << answer.err;
+    json told = read_json(folder / "p.json");
+    std::smatch found;
+    const std::string outside = told["release"]["outside_valid_range"].dump();
+    ASSERT_TRUE(std::regex_search(outside, found, std::regex("release_speed is ([-0-9.e]+) m/s"))) << outside;
+    const double speed = std::stod(found[1]);
+    ASSERT_TRUE(std::regex_search(outside, found, std::regex("release_omega is ([-0-9.e]+) rad/s")));
+    const double omega = std::stod(found[1]);
+    EXPECT_NEAR(speed, told["release"]["carried_rigidly"]["speed_m_s"].get<double>(), 0.2 * speed) << target;
+    // Joints 2, 4 and 6 pitch the hand forward, back and back: positive is from forward to up.
+    const auto rate = [&](std::size_t i) { return told["qd0_rad_s"][i].get<double>(); };
+    EXPECT_NEAR(omega, -(rate(1) - rate(3) - rate(5)), 1e-3 * std::abs(omega)) << target;
+    EXPECT_GT(std::abs(omega), 0.1);
+  }
+}
+
+// What a refusal says of the grip is the least that will do.
+TEST_F(Cli, TheGripThatIsAskedForHolds) {
+  write_bar(folder / "bar.toml", 0.25, 0.1);
+  const auto plan = [&](double grip_force) {
+    write_pivot_card(folder / "card.json", grip_force, 0.03);
+    return run("plan throw --target 1.3,0,-0.2 --samples 100 --draws 20 --card card.json --sku bar.toml");
+  };
+  const Answer weak = plan(3);
+  EXPECT_EQ(weak.code, 1);
+  std::smatch found;
+  ASSERT_TRUE(std::regex_search(weak.err, found, std::regex("needs at least ([0-9.]+) N per pad")))
+      << weak.err;
+  const double least = std::stod(found[1]);
+  EXPECT_EQ(plan(0.97 * least).code, 1);
+  EXPECT_EQ(plan(1.03 * least).code, 0);
 }
 
 // A grip that holds the nominal object and hardly more drops draws on the way; twice the object needs about

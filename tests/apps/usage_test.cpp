@@ -386,6 +386,27 @@ TEST_F(Cli, NoOutputTakesThePlaceOfSomethingElse) {
   EXPECT_EQ(read_json(folder / "old.json")["schema"], "inspect");
 }
 
+// What a directory will hold is known at the end only: nothing is in place by then.
+TEST_F(Cli, AReportReplacesNeitherItsCardNorALog) {
+  const std::string compare = "compare '" + quick + "' --models gripper_delay ";
+  ASSERT_EQ(run(compare + "--write-cards cards").code, 0);
+  fs::create_directory(folder / "out");
+  fs::copy_file(folder / "cards/gripper_delay.json", folder / "out/compare.json");
+  std::ofstream(folder / "a.json") << "the old one";
+  const std::string card = content(folder / "out/compare.json");
+  expect_refusal(compare + "--card out/compare.json --json a.json --report out", 2,
+                 "out/compare.json is read: it cannot be an output too");
+  EXPECT_EQ(content(folder / "out/compare.json"), card);
+  EXPECT_EQ(content(folder / "a.json"), "the old one");
+
+  fs::create_directory(folder / "logs");
+  fs::copy_file(quick, folder / "logs/report.md");
+  expect_refusal(compare + "--json a.json --report logs", 2,
+                 "logs/report.md is an HDF5 file, which only a log may replace");
+  EXPECT_EQ(content(folder / "logs/report.md"), content(quick));
+  EXPECT_EQ(content(folder / "a.json"), "the old one");
+}
+
 // Before anything is read: what is no log at all would end in 3.
 TEST_F(Cli, NoOutputReplacesAMeasurementOrAnotherOutput) {
   ASSERT_EQ(run("generate quick12 --seed 3 --out kept.h5").code, 0);
@@ -646,6 +667,53 @@ TEST_F(Cli, InspectTellsUnitsAndWhatIsDeclaredInJson) {
   EXPECT_EQ(seen["gripper"]["n_pads"], log.gripper->n_pads);
   EXPECT_EQ(seen["gripper"]["pad_radius_m"], *log.gripper->pad_radius);
   EXPECT_THAT(run("inspect '" + flights + "' --json").out, HasSubstr("\"gripper\": null"));
+}
+
+// Times are those of the file's clock, wherever it begins; a drag is what the object declares.
+TEST_F(Cli, InspectTellsTheOpeningByTheLogsClock) {
+  constexpr double kEpoch = 1.7e9;
+  auto log = datasets::read_throw_log(quick);
+  for (auto& one : log.throws) datasets::move_clock(one, -kEpoch);
+  log.gripper->opening_command_time = kEpoch + 0.125;
+  log.objects.begin()->second.drag_k = 0.0625;
+  datasets::write_throw_log(folder / "far.h5", log);
+  const Answer answer = run("inspect far.h5 --json i.json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  EXPECT_THAT(answer.out, HasSubstr("told to open at 1700000000.125 s"));
+  EXPECT_THAT(answer.out, HasSubstr("drag 0.0625 1/m"));
+  const json seen = read_json(folder / "i.json");
+  EXPECT_EQ(seen["gripper"]["opening_command_time_s"].get<double>(), kEpoch + 0.125);
+  EXPECT_EQ(seen["declared_objects"][log.objects.begin()->first]["drag_k_1_m"], 0.0625);
+}
+
+// Three slips to fit to and one held out, at 50 Hz with a pause in each.
+TEST_F(Cli, InspectCountsTheSlipsOfASurface) {
+  datasets::SlipLog log;
+  datasets::Surface& felt = log.surfaces["felt"];
+  felt = {0.8, 0.02, "made by a test", {}, {}};
+  for (int n = 0; n < 4; ++n) {
+    datasets::Slip slip{std::to_string(n),
+                        n == 2 ? datasets::Split::test : datasets::Split::train,
+                        {11, 1, {}, {}},
+                        {11, 3, {}, {}},
+                        {11, 3, {}, {}}};
+    for (int i = 0; i < 11; ++i) {
+      slip.time.data.push_back(0.02 * i + (i > 5 ? 1.0 : 0.0));
+      for (const double force : {1.0, 0.0, 0.0}) slip.wrench.data.push_back(force);
+      for (const double rate : {0.1, 0.0, 0.0}) slip.twist.data.push_back(rate);
+    }
+    felt.slips.push_back(std::move(slip));
+  }
+  datasets::write_slip_log(folder / "slips.h5", log);
+  const Answer answer = run("inspect slips.h5 --json i.json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  const json seen = read_json(folder / "i.json")["surfaces"]["felt"];
+  EXPECT_EQ(seen["slips"], 4);
+  EXPECT_EQ(seen["train"], 3);
+  EXPECT_EQ(seen["test"], 1);
+  EXPECT_EQ(seen["samples"], 44);
+  EXPECT_NEAR(seen["rate_hz"].get<double>(), 50, 1e-6);
+  EXPECT_THAT(answer.out, testing::ContainsRegex("felt +0.8 +0.02 +4 +3 +1 +44 +50\n"));
 }
 
 TEST_F(Cli, InspectShowsTheColumnsThatTheFileHas) {

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
 #include "contact/registry.hpp"
@@ -146,6 +147,55 @@ TEST_F(Bullet, ReleasesBeforeTheStartAreNoStepBackwards) {
     EXPECT_NEAR(theirs.detach.pose.theta, ours.detach.pose.theta, 1e-15);
     EXPECT_NEAR(theirs.detach.twist.vz, ours.detach.twist.vz, 1e-15);
     EXPECT_NEAR(theirs.relative.arm.x, 0.1, 1e-15);
+  }
+}
+
+// Slip and spin at the start are those between the pads: the centre of mass moves with the spin about them.
+TEST_F(Bullet, BeginsWithTheSlipAndTheSpinOfTheProblem) {
+  std::array<support::SwayingHand::Coordinate, 3> moving{};
+  moving[0].a = 3, moving[1].a = -2, moving[2].a = 4;
+  const support::SwayingHand hand(moving, 0.3);
+  const contact::ProfileNormalForce opening(contact::OpeningProfile<double>{0.0, 20, 0.02, 0.096, 1});
+  const release::ReleaseProblem<double> late{
+      hand, opening, *disc, {kMass, kInertia}, {0, -9.81}, {0.1, 0.3}, 0.2, {0.3, -0.2}, 5.0};
+  const auto ours = release::simulate_release(late);
+  const auto theirs = simulate_in_bullet(late, kPatch, with(BulletPads::pins, BulletFriction::along));
+  EXPECT_NEAR(theirs.detach.twist.vx, ours.detach.twist.vx, 1e-12);
+  EXPECT_NEAR(theirs.detach.twist.vz, ours.detach.twist.vz, 1e-12);
+  EXPECT_NEAR(theirs.detach.twist.omega, ours.detach.twist.omega, 1e-12);
+  EXPECT_NEAR(theirs.relative.slip.x, 0.3, 1e-12);
+  EXPECT_NEAR(theirs.relative.slip.z, -0.2, 1e-12);
+  EXPECT_NEAR(theirs.relative.spin, 5, 1e-12);
+}
+
+// A firm grip takes the object round with the hand.
+TEST_F(Bullet, PadsTurnWithTheHand) {
+  const auto hand = support::accelerating_hand({0, 0, 20}, 0.2);  // to 0.4 rad and 4 rad/s, by 0.02 N m
+  for (const auto pads : {BulletPads::pins, BulletPads::point}) {
+    const auto r =
+        simulate_in_bullet(problem(hand, {0, 0}, 0, {}, 0), kPatch, with(pads, BulletFriction::across, 1e-4));
+    EXPECT_NEAR(r.detach.pose.theta, 0.4, 0.01) << to_string(pads);
+    EXPECT_NEAR(r.detach.twist.omega, 4, 0.05) << to_string(pads);
+  }
+}
+
+// What holds is friction times the number of pads.
+TEST_F(Bullet, OnePadOfTwiceTheFrictionIsTwoPads) {
+  const auto hand = support::still_hand(0.05);
+  for (const auto pads : {BulletPads::pins, BulletPads::point}) {
+    const auto slid = [&](int count) {
+      contact::Patch<double> patch = kPatch;
+      patch.mu = 1.0 / count, patch.pads = count;
+      return simulate_in_bullet(problem(hand, {0, 0}, 0, {0.7, 0}, 8), patch,
+                                with(pads, BulletFriction::along))
+          .relative;
+    };
+    const auto two = slid(2);
+    for (const int count : {1, 4}) {
+      const auto other = slid(count);
+      EXPECT_NEAR(other.slip.x, two.slip.x, 1e-9) << count << to_string(pads);
+      EXPECT_NEAR(other.spin, two.spin, 1e-9) << count << to_string(pads);
+    }
   }
 }
 

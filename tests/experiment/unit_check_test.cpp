@@ -606,6 +606,10 @@ TEST(UnitCheck, FlightsContradictAWrongLandingHeight) {
     const auto told = only_doubt(log);
     EXPECT_EQ(told.path, "/@landing_height");
     EXPECT_THAT(told.reason, AllOf(HasSubstr("motion capture sees"), HasSubstr("accepted are")));
+    const std::string said = "land at ";
+    ASSERT_THAT(told.reason, HasSubstr(said));
+    EXPECT_NEAR(std::stod(told.reason.substr(told.reason.find(said) + said.size())),
+                campaign().landing_height, 0.004);
     for (auto& one : log.throws) one.mocap.reset();  // then nothing does
     EXPECT_THAT(unit_doubts(log), IsEmpty());
   }

@@ -189,6 +189,41 @@ TEST(Transfer, IsExactInItsFirstTwoIterationsWhereItsAssumptionHolds) {
   EXPECT_LT(path.minimum(), 0.1);
 }
 
+// The third iteration begins from the second, in the plane of the best, the next and the fourth of the past.
+TEST(Transfer, ItsThirdIterationLooksIntoAnotherPlane) {
+  const LinearPlant old{false, 0.0}, now{false, 0.06};
+  const auto past = gather(old, "population", population_grid(kRange), 1, kBar).data;
+  const auto between = [](const FlipCommand& from, const FlipCommand& to) {
+    const auto a = kRange.fractions(from), b = kRange.fractions(to);
+    return Eigen::Vector3d(b[0] - a[0], b[1] - a[1], b[2] - a[2]);
+  };
+  int planes = 0;
+  for (const FlipTarget& target :
+       {FlipTarget{{1.35, 4.0}}, {{1.2, 3.5}}, {{1.5, 4.5}}, {{1.25, 4.4}}, {{1.4, 3.2}}, {{1.3, 5}}}) {
+    auto as_now = transferred(past, 0.06);
+    std::stable_sort(as_now.begin(), as_now.end(), [&](const FlipDatum& a, const FlipDatum& b) {
+      return normalized_error(a.landing, target) < normalized_error(b.landing, target);
+    });
+    const auto normal = [&](std::size_t third) {
+      return Eigen::Vector3d(between(as_now[0].command, as_now[1].command)
+                                 .cross(between(as_now[0].command, as_now[third].command)));
+    };
+    if (normal(2).norm() < 1e-3 || normal(3).norm() < 1e-3 ||
+        normal(2).normalized().cross(normal(3).normalized()).norm() < 1e-3)
+      continue;  // on a line, or in one plane
+    TransferLearner learner(past, 0.06, target, kRange);
+    const LearningPath path =
+        learn(learner, target, transferred(past, 0.06), {kBar.mass, kBar.inertia, 0.18}, now, {3, 1, true});
+    ASSERT_EQ(path.iterations.size(), 3u);
+    ++planes;
+    const Eigen::Vector3d second = between(path.iterations[0].command, path.iterations[1].command),
+                          third = between(path.iterations[1].command, path.iterations[2].command);
+    EXPECT_NEAR(second.dot(normal(2)), 0, 1e-9) << target.pose.x;
+    EXPECT_NEAR(third.dot(normal(3)), 0, 1e-9) << target.pose.x;
+  }
+  EXPECT_GE(planes, 1);
+}
+
 // The nearest of the past differ in one parameter only, so that its three opening commands span no plane.
 TEST(Transfer, GoesOnWhereItsCommandsLieOnALine) {
   const LinearPlant plant{false};

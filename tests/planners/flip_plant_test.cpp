@@ -463,5 +463,52 @@ TEST(FlipMotion, EveryLimitOfAJointRefuses) {
   }
 }
 
+// Links without weight have an inertia still, which differs from robot to robot as their mass does.
+TEST(FlipPlant, TheInertiaOfLinksDiffersWithTheirMass) {
+  FlipRobot r = exact_robot();
+  for (Joint& joint : r.chain.joints) {
+    joint.link.about_com += 0.3 * Eigen::Matrix3d::Identity();
+    joint.link.mass = 1e-9;
+  }
+  r.robots.link_mass = 0.1;
+  const auto angle = [&](std::uint64_t seed) {
+    return FlipPlant(r, seed).throw_bar(middle(), r.bar, 1, {{1, 0.0}, 1}).landing.angle;
+  };
+  EXPECT_GT(std::abs(angle(1) - angle(2)), 1e-4);
+}
+
+// A range is refused where one of its corners cannot be swung, also if the slowest there and the fastest of
+// the other end can.
+TEST(FlipRobotFile, EveryCornerOfItsRangeIsTried) {
+  FlipRobot r = exact_robot();
+  const CommandRange& range = r.motion.range;
+  const auto works = [&](double pitch, double speed) {
+    try {
+      check_reference(r, {pitch, speed, range.low.damping});
+      return true;
+    } catch (const std::invalid_argument&) {
+      return false;
+    }
+  };
+  const double fast = range.high.speed, slow = range.low.speed;
+  double low = range.low.pitch, high = range.high.pitch;
+  while (low > -6 && works(low, fast) && works(low, slow)) low -= 0.01;
+  while (high < 6 && works(high, fast) && works(high, slow)) high += 0.01;
+  int tried = 0;
+  const support::Scratch scratch;
+  const auto path = scratch.path() / "robot.toml";
+  for (const auto& [from, to] : {std::pair{low, range.high.pitch}, {range.low.pitch, high}}) {
+    if (!works(from, slow) || !works(to, fast)) continue;  // refused by these already
+    ++tried;
+    std::string text(built_in_robot());
+    const auto at = text.find("pitch_rad = ["), end = text.find(']', at);
+    text.replace(at, end - at + 1, fmt::format("pitch_rad = [{:.4f}, {:.4f}]", from, to));
+    std::ofstream(path) << text;
+    EXPECT_THAT([&] { read_flip_robot(path.string()); },
+                ThrowsMessage<datasets::TomlError>(HasSubstr("panda_joint")));
+  }
+  EXPECT_GE(tried, 1);
+}
+
 }  // namespace
 }  // namespace unhand::planners::flip

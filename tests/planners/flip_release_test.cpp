@@ -146,6 +146,37 @@ TEST(ReleaseFit, CardComesBackAsItWasWritten) {
   EXPECT_EQ(back.length_sigma, fit.card.length_sigma);
 }
 
+// What the physics does not explain makes a fit less sure, by its square; of that part there are as few
+// degrees of freedom as residuals tell, and more of the sum of it and of the prior (Welch, Satterthwaite).
+TEST(ReleaseFit, WhatIsNotExplainedMakesItLessSure) {
+  const HandLibrary small(robot(), robot().bar, 2);
+  const CardPlant plant{prior_card(robot())};
+  const auto exact = gather(plant, "support", support_simplex(robot().motion.range), 1, robot().bar).data;
+  const auto fitted = [&](double size) {
+    auto data = exact;
+    int sign = 1;
+    for (FlipDatum& one : data)
+      for (std::size_t j = 0; j < 6; ++j) one.detach[j] += size * (sign = -sign) * kDiscrepancy[j];
+    return fit_release(small, prior_card(robot()), data);
+  };
+  const ReleaseFit none = fitted(0), some = fitted(0.3), more = fitted(0.6);
+  // Of friction and length by their logarithms, as they are fitted.
+  const auto variance = [](const ReleaseFit& fit, int k) {
+    return fit.covariance(k, k) / std::pow(k == 0 ? fit.card.mu.value : k == 1 ? fit.card.length : 1.0, 2);
+  };
+  for (int k = 0; k < 4; ++k) {
+    const double prior = variance(none, k), once = variance(some, k) - prior,
+                 twice = variance(more, k) - prior;
+    EXPECT_GT(once, 0) << k;
+    EXPECT_NEAR(twice, 4 * once, 0.4 * once) << k;
+    const auto i = static_cast<std::size_t>(k);
+    const double of_some = some.degrees_of_freedom[i] * std::pow(once / (prior + once), 2),
+                 of_more = more.degrees_of_freedom[i] * std::pow(twice / (prior + twice), 2);
+    EXPECT_NEAR(of_some, of_more, 0.1 * of_more) << k;
+    EXPECT_LT(of_more, 24) << "residuals";
+  }
+}
+
 TEST(LeftOverField, KnowsWhatItSawAndDoubtsTheRest) {
   LeftOverField field;
   field.set({}, {});
@@ -451,6 +482,27 @@ TEST(ReleaseLearner, TakesInWhatItHasSeen) {
   EXPECT_GT(before, 0.3);
   EXPECT_NEAR(learner.forecast(u)->mean.angle, seen.landing.angle, 0.01 * before);
   EXPECT_LT(learner.forecast(u)->sigma_angle, 0.1);
+}
+
+// A command that is known to land within the tolerances is thrown again, although of others, which are not
+// known as well, one may land in their middle.
+TEST(ReleaseLearner, PrefersTheSureHitToTheNearestMean) {
+  const HandLibrary small(robot(), robot().bar, 3);
+  const FlipCommand known = robot().motion.range.at(0.5, 0.5, 0.5);
+  ThrowScatter exact = scatter_of({}, 0.12);
+  for (double& v : exact.detach) v *= 1e-6;
+  exact.x = 1e-4 * 1e-4, exact.angle = 1e-3 * 1e-3;
+  const LeftOver seen{{0.5, 0.5, 0.5}, robot().bar, kDiscrepancy, 3};  // no small one: what is left varies
+  const ReleaseLearner any(small, {prior_card(robot())}, {seen}, exact, {{1.2, kTurn / 2}}, 3);
+  FlipTarget target{any.forecast(known).value().mean};
+  target.pose.x += 0.8 * target.tolerance_x;
+  ReleaseLearner learner = any.aimed_at(target);
+  const auto next = learner.next();
+  ASSERT_TRUE(next);
+  const auto sure = learner.forecast(known), taken = learner.forecast(*next);
+  ASSERT_TRUE(sure && taken);
+  EXPECT_GT(sure->probability, 0.99);
+  EXPECT_GT(taken->probability, sure->probability - 0.02);
 }
 
 // Friction and the pads' force are known, and scatter, as one product.

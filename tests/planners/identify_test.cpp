@@ -86,6 +86,56 @@ TEST_P(Identify, InertiaComesBackWithinItsIntervals) {
               3 * std::sqrt(0.95 * 0.05 / all) + (GetParam().stays > 0 ? 0.03 : 0));
 }
 
+/// Of so many samples, torques of joints whose noises stay from one to the next, each as it does: the errors
+/// of the combinations found in their sigmas, their mean square over logs, and that of what bodies miss them
+/// by.
+double squared_errors(int samples, const std::array<double, 3>& sigma, const std::array<double, 3>& stays,
+                      int logs) {
+  const Chain truth = arm();
+  ExcitationOptions design;
+  design.trials = 20;
+  const DesignedExcitation excitation = design_excitation(truth, design);
+  const Eigen::VectorXd parameters = control::parameters_of(truth);
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> normal;
+  double squares = 0, all = 0;
+  for (int n = 0; n < logs; ++n) {
+    std::vector<MotionSample> log;
+    JointVector<double> noise(3);
+    for (int k = 0; k < samples; ++k) {
+      MotionSample s{JointVector<double>(3), JointVector<double>(3), JointVector<double>(3),
+                     JointVector<double>(3)};
+      excitation.motion.at(excitation.motion.period * k / samples, s.q, s.qd, s.qdd);
+      for (int i = 0; i < 3; ++i) {
+        const auto j = static_cast<std::size_t>(i);
+        const double anew = sigma[j] * normal(random);
+        noise[i] = k == 0 ? anew : stays[j] * noise[i] + std::sqrt(1 - stays[j] * stays[j]) * anew;
+      }
+      s.torque = inverse_dynamics<double>(truth, s.q, s.qd, s.qdd) + noise;
+      log.push_back(s);
+    }
+    const IdentifiedInertia found = identify_inertia(truth, log);
+    squares += (found.combinations.transpose() * parameters - found.estimate)
+                   .cwiseQuotient(found.sigma)
+                   .squaredNorm();
+    all += static_cast<double>(found.estimate.size());
+    const double beside =
+        std::sqrt((found.combinations.transpose() * control::parameters_of(found.feasible) - found.estimate)
+                      .cwiseQuotient(found.sigma)
+                      .squaredNorm() /
+                  static_cast<double>(found.estimate.size()));
+    EXPECT_NEAR(found.feasible_misfit, beside, 1e-6 + 1e-3 * beside) << "in sigmas, of all combinations";
+  }
+  return squares / all;
+}
+
+// Errors are as large as their sigmas say where joints differ in how long their noise stays, and in short
+// logs.
+TEST(IdentifyInertia, SigmasHoldWhereNoiseStays) {
+  EXPECT_NEAR(squared_errors(200, {0.05, 0.05, 0.05}, {0, 0.6, 0.95}, 40), 0.9, 0.4);
+  EXPECT_NEAR(squared_errors(30, {0.05, 0.05, 0.05}, {0.7, 0.7, 0.7}, 120), 1.2, 0.5);
+}
+
 TEST(IdentifyInertia, RefusesSamplesOfAnotherArm) {
   const Chain prior = arm();
   const JointVector<double> all = JointVector<double>::Zero(3), two = JointVector<double>::Zero(2);

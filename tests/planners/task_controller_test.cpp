@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <random>
 
 #include "planners/arm/panda.hpp"
@@ -455,16 +456,22 @@ TEST(ThrowStudy, TellsTheTorqueThatWasAskedFor) {
   EXPECT_GT(run_throw({"stiff", 3000, 400, false}, {"object", 2.5, 0.05}, fast, 1).torque_use, 1);
 }
 
-// Another way round: a throw to the right misses there as a throw ahead does ahead.
+// Another way round: a throw aside misses there as a throw ahead does ahead.
 TEST(ThrowStudy, ThrowsToTheSideAsItThrowsAhead) {
-  StudyOptions ahead = ideal(), aside = ideal();
-  for (Eigen::Vector3d StudyOptions::*one :
-       {&StudyOptions::start, &StudyOptions::release, &StudyOptions::velocity})
-    aside.*one = {(ahead.*one).y(), -(ahead.*one).x(), (ahead.*one).z()};
-  const Eigen::Vector2d a = throw_once_with(ahead, 0.4).miss, b = throw_once_with(aside, 0.4).miss;
-  EXPECT_LT(a.x(), -0.03);                            // the load pulls it short
-  EXPECT_NEAR(-b.y(), a.x(), 0.1 * std::abs(a.x()));  // the hand is not turned along
-  EXPECT_NEAR(b.x(), a.y(), 0.1 * std::abs(a.x()));
+  const StudyOptions ahead = ideal();
+  const Eigen::Vector2d a = throw_once_with(ahead, 0.4).miss;
+  EXPECT_LT(a.x(), -0.03);  // the load pulls it short
+  for (const double turn : {-std::numbers::pi / 2, -0.7, 1.2, std::numbers::pi / 2}) {
+    StudyOptions aside = ahead;
+    for (Eigen::Vector3d StudyOptions::*one :
+         {&StudyOptions::start, &StudyOptions::release, &StudyOptions::velocity})
+      aside.*one = Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ()) * (ahead.*one);
+    const Eigen::Vector2d b = Eigen::Rotation2Dd(-turn) * throw_once_with(aside, 0.4).miss;
+    EXPECT_LT((b - a).norm(), 0.1 * std::abs(a.x())) << turn;  // the hand is not turned along
+  }
+  StudyOptions behind = ahead;  // where joint 1 does not turn
+  behind.start.x() = -ahead.start.x();
+  EXPECT_THROW(throw_once_with(behind, 0.4), std::invalid_argument);
 }
 
 // The record's errors over the throwing part of a repetition are those that the run sums up.
@@ -479,6 +486,26 @@ TEST(ThrowStudy, SumsUpItsRecord) {
     if (s.t < o.throw_time - 1e-9) squares += s.position_error * s.position_error, ++counted;
   EXPECT_EQ(counted, 70);  // every 10 ms
   EXPECT_NEAR(run.rms_error.front(), std::sqrt(squares / counted), 0.02 * run.rms_error.front());
+}
+
+// In the joints, too, a hand that is held harder against turning gives way less to its load.
+TEST(ThrowStudy, JointsFeelTheStiffnessAgainstTurning) {
+  const auto lag = [](double rotational) {
+    StudyOptions once = ideal();
+    once.repetitions = 0;
+    return run_throw({"joints", 30, rotational, false, true}, {"object", 0.4, 0.05}, once, 1)
+        .release_position_error;
+  };
+  EXPECT_LT(lag(40), 0.7 * lag(10));
+}
+
+// What the estimate takes off the load that is not known is no error any more: V falls with the learning.
+TEST(ThrowStudy, LyapunovsFunctionFallsAsTheLoadIsLearned) {
+  StudyOptions o = ideal();
+  o.repetitions = 2;
+  const StudyThrow run = run_throw({"adaptive", 30, 10, true}, {"object", 0.4, 0.05}, o, 1, true);
+  ASSERT_GT(run.history.back().mass_estimate, 0.8 * 0.4);
+  EXPECT_LT(run.history.back().lyapunov, 0.9 * run.history.front().lyapunov) << "what no motion shows stays";
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 
 #include <numbers>
 #include <random>
+#include <tuple>
 
 #include "planners/arm/dynamics.hpp"
 #include "planners/arm/panda.hpp"
@@ -425,6 +426,26 @@ TEST(PlanThrow, StaysAboveItsBase) {
   const auto result = plan_throw(arm, boxes()[0], options);
   EXPECT_EQ(result.outcome, PlanOutcome::no_motion);
   EXPECT_THAT(result.reason, testing::HasSubstr("the arm would come down to -0."));
+}
+
+// Braking begins with the acceleration of the window: what that adds to a velocity at its limit is left room
+// for, where the throw has it.
+TEST(PlanThrow, LeavesRoomForItsBrake) {
+  const Chain arm = thrower();
+  for (const auto& [window, drag, box] : {std::tuple{0.13, 0.2, box_at(1.1, 0, 0)},
+                                          {0.2, 0.0, box_at(1.3, 0, -0.2)},
+                                          {0.2, 0.0, box_at(1.2, 0, 0)}}) {
+    PlanOptions options;
+    options.home = panda_ready();
+    options.search = planar();
+    options.search.samples = 100;
+    options.search.window = window;
+    options.search.medium.drag_k = drag;
+    const auto result = plan_throw(arm, box, options);
+    ASSERT_TRUE(result.plan) << result.reason;
+    EXPECT_TRUE(check_limits(arm, result.plan->motion, 1e-4).within()) << result.plan->limits.worst(arm);
+    EXPECT_LE(largest_miss(result.plan->landings), 0.075 * std::numbers::sqrt2);
+  }
 }
 
 // What a plan says of its limits is what a look as dense finds, not what the first, coarse one did.

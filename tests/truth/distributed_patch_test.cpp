@@ -91,6 +91,29 @@ TEST(DistributedPatch, ItsTorqueTendsToThatOfThePressure) {
   }
 }
 
+// Pads without friction let the object go as it began: its centre moves with slip and spin of the pads, and
+// falls.
+TEST(DistributedPatch, BeginsWithTheSlipAndTheSpinOfTheProblem) {
+  const auto hand = support::still_hand(0.05);
+  const support::ConstantForce force(1);
+  contact::ContactParameters<double> parameters;
+  parameters.patch = {kMu, kRadius, 2.0 / 3, 2};
+  const auto unused = contact::make_contact_model("limit_surface_disc", parameters);
+  const dynamics::Vec2<double> arm{0.1, 0.03}, slip{0.3, -0.2};
+  const double spin = 5, angle = 0.4, t = 0.05;
+  const release::ReleaseProblem<double> free{
+      hand, force, *unused, {0.5, 1e-3}, {0, -9.81}, {arm.x, angle, arm.z}, 0.0, slip, spin};
+  const auto end = simulate_distributed_patch(free, {1e-12, kRadius, disc_points(2)}).detach;
+  const auto r = dynamics::rotate(angle, arm);
+  const double vx = slip.x - spin * r.z, vz = slip.z + spin * r.x;
+  EXPECT_NEAR(end.twist.vx, vx, 1e-9);
+  EXPECT_NEAR(end.twist.vz, vz - 9.81 * t, 1e-9);
+  EXPECT_NEAR(end.twist.omega, spin, 1e-9);
+  EXPECT_NEAR(end.pose.x, r.x + vx * t, 1e-9);
+  EXPECT_NEAR(end.pose.z, r.z + vz * t - 0.5 * 9.81 * t * t, 1e-6);
+  EXPECT_NEAR(end.pose.theta, angle + spin * t, 1e-9);
+}
+
 struct Scene {
   support::RandomThrow thrown;
   std::unique_ptr<contact::ContactModel> model;
