@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <utility>
+#include <vector>
 
 #include "planners/arm/kinematics.hpp"
 #include "planners/tube/require.hpp"
@@ -161,6 +162,40 @@ bool leave_room(const LimitUse& velocity, const Chain& chain, Chain& allowed) {
   return true;
 }
 
+/// A nominal throw made into a plan, or why not.
+struct Trial {
+  PlanOutcome outcome{};
+  std::string reason;
+  ThrowPlan plan;
+};
+/// `allowed`: the chain with what the window's end may have of its limits.
+Trial try_throw(const Chain& chain, const Chain& allowed, const NominalThrow& nominal, const TargetBox& box,
+                const JointVector<double>& home, const PlanOptions& options) {
+  const TubeProblem problem{allowed, nominal.state, box.middle, options.search.window, options.search.medium};
+  Trial out{PlanOutcome::no_tube, {}, {}};
+  ThrowPlan& plan = out.plan;
+  plan.nominal = nominal;
+  plan.tube = solve_tube(problem);
+  out.reason = plan.tube.reason;
+  if (plan.tube.outcome != TubeOutcome::solved) return out;
+  plan.qdd = options.refine ? refine_tube(problem, plan.tube.qdd) : plan.tube.qdd;
+  const auto landings = [&](const JointVector<double>& qdd) {
+    return landings_over_window(problem, qdd, kLandingSamples);
+  };
+  plan.at_rest = landings(JointVector<double>::Zero(chain.size()));
+  plan.tube_landings = landings(plan.tube.qdd);
+  plan.landings = landings(plan.qdd);
+  if (!std::all_of(plan.landings.begin(), plan.landings.end(),
+                   [&](const LandingAt& at) { return at.lands && box.holds(at.x, at.y); })) {
+    out.reason =
+        fmt::format("the window's landings miss the middle by up to {:.3f} m", largest_miss(plan.landings));
+    return out;
+  }
+  out.outcome =
+      add_motion(chain, home, options, plan, out.reason) ? PlanOutcome::planned : PlanOutcome::no_motion;
+  return out;
+}
+
 /// Why the search found nothing: by what it finds without one demand or another.
 std::string why_no_throw(const Chain& chain, const TargetBox& box, NominalOptions search) {
   search.refined = 0;
@@ -194,48 +229,34 @@ PlanResult plan_throw(const Chain& chain, const TargetBox& box, const PlanOption
   out.throws = static_cast<int>(throws.size());
   out.outcome = PlanOutcome::no_throw;
   if (throws.empty()) out.reason = why_no_throw(chain, box, options.search);
+  std::vector<std::pair<const NominalThrow*, Chain>> nearly;  // with what the window's end may have of limits
+  /// Whether there is a plan. Where limits are too narrow by little, what would leave room goes to `nearly`.
+  const auto planned = [&](const NominalThrow& nominal, Chain allowed) {
+    Trial trial = try_throw(chain, allowed, nominal, box, home, options);
+    if (trial.outcome == PlanOutcome::planned) {
+      out.outcome = PlanOutcome::planned;
+      out.reason.clear();
+      out.plan = std::move(trial.plan);
+      return true;
+    }
+    const bool no_motion = trial.outcome == PlanOutcome::no_motion;
+    // The first that nearly was a plan says why, else the first.
+    if (no_motion ? out.outcome != PlanOutcome::no_motion : out.outcome == PlanOutcome::no_throw) {
+      out.outcome = trial.outcome;
+      out.reason = std::move(trial.reason);
+    }
+    if (no_motion && leave_room(trial.plan.limits.velocity, chain, allowed))
+      nearly.emplace_back(&nominal, std::move(allowed));
+    return false;
+  };
   for (const NominalThrow& nominal : throws) {
     ++out.tried;
-    Chain allowed = chain;  // at the window's end
-    for (bool again = true; std::exchange(again, false);) {
-      const TubeProblem problem{allowed, nominal.state, box.middle, options.search.window,
-                                options.search.medium};
-      ThrowPlan plan;
-      plan.nominal = nominal;
-      plan.tube = solve_tube(problem);
-      std::string reason = plan.tube.reason;
-      const bool first = out.outcome == PlanOutcome::no_throw;
-      if (plan.tube.outcome == TubeOutcome::solved) {
-        plan.qdd = options.refine ? refine_tube(problem, plan.tube.qdd) : plan.tube.qdd;
-        const auto landings = [&](const JointVector<double>& qdd) {
-          return landings_over_window(problem, qdd, kLandingSamples);
-        };
-        plan.at_rest = landings(JointVector<double>::Zero(chain.size()));
-        plan.tube_landings = landings(plan.tube.qdd);
-        plan.landings = landings(plan.qdd);
-        const bool inside = std::all_of(plan.landings.begin(), plan.landings.end(), [&](const LandingAt& at) {
-          return at.lands && box.holds(at.x, at.y);
-        });
-        if (inside) {
-          if (add_motion(chain, home, options, plan, reason)) {
-            out.outcome = PlanOutcome::planned;
-            out.reason.clear();
-            out.plan = std::move(plan);
-            return out;
-          }
-          if (out.outcome != PlanOutcome::no_motion) out.reason = reason;
-          out.outcome = PlanOutcome::no_motion;
-          again = leave_room(plan.limits.velocity, chain, allowed);
-          continue;
-        }
-        reason = fmt::format("the window's landings miss the middle by up to {:.3f} m",
-                             largest_miss(plan.landings));
-      }
-      if (first) {
-        out.outcome = PlanOutcome::no_tube;
-        out.reason = reason;
-      }
-    }
+    if (planned(nominal, chain)) return out;
+  }
+  while (!nearly.empty()) {
+    const auto again = std::exchange(nearly, {});
+    for (const auto& [nominal, allowed] : again)
+      if (planned(*nominal, allowed)) return out;
   }
   return out;
 }

@@ -72,8 +72,10 @@ struct PlanResult {
   int tried{};                    ///< of them, until one went all the way
 };
 
-/// Tries the throws of find_throws in order of their margin. The same options give the same plan.
-/// Throws std::invalid_argument as find_throws does, and for a home of another number of joints.
+/// Tries the throws of find_throws in order of their margin; if none goes all the way, those again whose
+/// brake goes beyond a velocity limit by up to 5 %, with as much less of it at the window's end. The same
+/// options give the same plan. Throws std::invalid_argument as find_throws does, and for a home of another
+/// number of joints.
 PlanResult plan_throw(const Chain& chain, const TargetBox& box, const PlanOptions& options = {});
 
 }  // namespace unhand::planners
