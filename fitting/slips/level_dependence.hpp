@@ -41,7 +41,8 @@ struct LevelAnswer {
 /// so by a one-sided paired t-test (every slip one observation, predicted by the slips of the other folds;
 /// `family_wise_level` is shared among the questions) and by `matters`; one effect of speed at most. Sizes
 /// are fitted in turn with the surface, to the wrenches without them, until both rest; σ by the scatter
-/// between slips, without what the surface's fit takes up: of 40 to 60 slips 1.4 times too small. Surfaces with fewer than two slips a fold are left out. `fits`: one per entry of `slips`.
+/// between slips, without what the surface's fit takes up: too small where slips are few. Surfaces with fewer
+/// than two slips a fold are left out. `fits`: one per entry of `slips`.
 LevelAnswer level_dependence(const std::vector<SlipSamples>& slips, const std::vector<SlipSurface>& fits,
                              const SurfaceDiscoveryOptions& options);
 
