@@ -791,16 +791,17 @@ TEST(ThrowMotion, RefusesAnotherNumberOfJoints) {
 
 TEST(PlanarHand, TurnsOnWhereItsAnglesWouldJump) {
   // The hand's axis turned so that it points straight back from the target halfway: θ passes π there.
-  const ReleaseThrow unturned = swing(pads());
+  const Chain bare = pads();
+  const ReleaseThrow unturned = swing(bare);
   const auto tip_at = [&](double t) {
-    return forward_kinematics(unturned.chain,
+    return forward_kinematics(bare,
                               Joints(unturned.start.q + t * unturned.start.qd + 0.5 * t * t * unturned.qdd));
   };
   const Transform<double> middle = tip_at(0.5 * unturned.hold);
   const Eigen::Vector3d back = middle.R.transpose() * Eigen::Vector3d(-1, 0, 0);
   const Eigen::Matrix3d turn =
       Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), back).toRotationMatrix();
-  const Chain arm = with_tool(pads(), {turn, Eigen::Vector3d::Zero()});
+  const Chain arm = with_tool(bare, {turn, Eigen::Vector3d::Zero()});
   const ReleaseThrow p = swing(arm);
   const ThrowPlane plane(forward_kinematics(arm, p.start.q).p, p.target);
   const PlanarHand hand(arm, plane, p.start.q, p.start.qd.cast<Dual>(), p.qdd.cast<Dual>(), p.hold);
