@@ -69,6 +69,17 @@ inline std::map<std::string, std::vector<std::string>> columns_of(const std::str
   return out;
 }
 
+/// How high every throw of a log flew, as motion capture saw it [m].
+inline std::vector<double> peaks_of(const datasets::ThrowLog& log) {
+  std::vector<double> out;
+  for (const auto& one : log.throws) {
+    double& peak = out.emplace_back(-1);
+    for (std::size_t i = 0; i < one.mocap->pose.rows; ++i)
+      if (one.mocap->is_valid(i)) peak = std::max(peak, one.mocap->pose(i, 1));
+  }
+  return out;
+}
+
 /// Every test has a folder of its own; a tiny campaign is made once for all.
 class Cli : public testing::Test {
  protected:

@@ -517,13 +517,8 @@ TEST_F(Cli, CompareSumsUpItsThrows) {
 // Some throws of each split never come down to a table as high as half of them fly.
 TEST_F(Cli, CompareCountsWhatDoesNotLandBySplit) {
   auto log = datasets::read_throw_log(quick);
-  std::vector<double> peaks;
-  for (auto& one : log.throws) {
-    one.landing.reset();
-    double& peak = peaks.emplace_back(-1);
-    for (std::size_t i = 0; i < one.mocap->pose.rows; ++i)
-      if (one.mocap->is_valid(i)) peak = std::max(peak, one.mocap->pose(i, 1));
-  }
+  for (auto& one : log.throws) one.landing.reset();
+  const std::vector<double> peaks = peaks_of(log);
   for (auto& one : log.throws) one.split = datasets::Split::train;
   const auto sorted = [&] {
     auto out = peaks;

@@ -220,13 +220,8 @@ TEST_F(Cli, ThePredictedSigmasAreThoseOfTheFriction) {
 TEST_F(Cli, ThrowsThatDoNotLandAreToldInWords) {
   ASSERT_EQ(run("fit " + quick + " --model limit_surface_disc --card c.json").code, 0);
   auto log = datasets::read_throw_log(quick);
-  std::vector<double> peaks;
-  for (auto& one : log.throws) {
-    one.landing.reset();
-    double& peak = peaks.emplace_back(-1);
-    for (std::size_t i = 0; i < one.mocap->pose.rows; ++i)
-      if (one.mocap->is_valid(i)) peak = std::max(peak, one.mocap->pose(i, 1));
-  }
+  for (auto& one : log.throws) one.landing.reset();
+  std::vector<double> peaks = peaks_of(log);
   std::sort(peaks.begin(), peaks.end());
   log.landing_height = peaks[peaks.size() / 2];
   datasets::write_throw_log(folder / "high.h5", log);
