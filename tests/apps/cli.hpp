@@ -15,6 +15,7 @@
 #include <numbers>
 #include <set>
 #include <sstream>
+#include <vector>
 
 #include "datasets/slip_log.hpp"
 #include "datasets/throw_log.hpp"
