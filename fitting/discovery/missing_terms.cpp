@@ -222,7 +222,7 @@ std::vector<Fitted> forms_of(const Moments& seen, const std::vector<Variant>& va
 
 /// The one that explains most for its coefficients. Where the right term is missing, the scatter is not noise
 /// and says little for groups that differ.
-std::optional<Fitted> best_of(const Moments& seen, std::vector<Fitted> forms) {
+std::optional<Fitted> best_of(const Moments& seen, const std::vector<Fitted>& forms) {
   if (forms.empty()) return {};
   double most = 0;
   for (const Fitted& one : forms) most = std::max(most, one.gain);

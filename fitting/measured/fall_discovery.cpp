@@ -1,8 +1,8 @@
 #include "fitting/measured/fall_discovery.hpp"
 
 #include <fmt/format.h>
-#include <Eigen/LU>
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -68,20 +68,6 @@ double argument(const GroupMotion& motion, std::size_t sample, const Form& form)
   return form.of_speed ? flight::norm(motion.velocity[sample]) : motion.time[sample];
 }
 
-/// One unknown function of a form: along one direction, of the groups of one object or of all.
-struct Column {
-  std::size_t along;   ///< into Form::along
-  std::string object;  ///< none: all
-};
-
-/// A form with one function of each component for all objects, or with one for every object.
-std::vector<Column> columns_of(const Form& form, const std::vector<std::string>& objects) {
-  std::vector<Column> out;
-  for (const std::string& object : objects)
-    for (std::size_t c = 0; c < form.along.size(); ++c) out.push_back({c, object});
-  return out;
-}
-
 /// A group's rows and how it moved.
 struct Seen {
   std::size_t group{};
@@ -121,22 +107,16 @@ std::vector<double> knots_of(const std::vector<Seen>& seen, const Form& form) {
 /// out.
 std::vector<MatrixXd> parts_of(const GroupedProblem& problem, const GroupedFit& fit,
                                const std::vector<Seen>& seen, const Form& form,
-                               const std::vector<Column>& functions, const std::vector<double>& knots,
-                               const GroupedFitOptions& options) {
+                               const std::vector<double>& knots, const GroupedFitOptions& options) {
   std::vector<MatrixXd> out(seen.size());
   dynamics::parallel_for(seen.size(), options.threads, [&](std::size_t n) {
     const auto& [group, motion, equations] = seen[n];
     std::vector<VectorXd> columns;
-    for (const Column& function : functions)
+    for (std::size_t c = 0; c < form.along.size(); ++c)
       for (std::size_t j = 0; j < knots.size(); ++j) {
-        if (!function.object.empty() && function.object != problem.groups()[group].object) {
-          columns.push_back(VectorXd::Zero(equations.residual.size()));
-          continue;
-        }
         std::vector<Vec3<double>> a;
         for (std::size_t i = 0; i < motion.time.size(); ++i)
-          a.push_back(flight::scaled(hat(knots, j, argument(motion, i, form)),
-                                     form.direction(motion, i, function.along)));
+          a.push_back(flight::scaled(hat(knots, j, argument(motion, i, form)), form.direction(motion, i, c)));
         columns.push_back(problem.response(group, a));
       }
     GroupEquations e = equations;
@@ -148,6 +128,25 @@ std::vector<MatrixXd> parts_of(const GroupedProblem& problem, const GroupedFit& 
     const auto p = projected(std::move(e), problem.groups()[group], fit.weights, options.sample_limit);
     out[n] = fit.weights.group[group] * gram(p.columns);
   });
+  return out;
+}
+
+/// The same where every one of these objects has functions of its own.
+std::vector<MatrixXd> of_objects(const std::vector<MatrixXd>& parts, Index shared,
+                                 const std::vector<Seen>& seen, const GroupedProblem& problem,
+                                 const std::vector<std::string>& objects) {
+  std::vector<MatrixXd> out;
+  for (std::size_t n = 0; n < parts.size(); ++n) {
+    const Index width = parts[n].rows() - 1 - shared,
+                all = shared + static_cast<Index>(objects.size()) * width;
+    const auto own = std::find(objects.begin(), objects.end(), problem.groups()[seen[n].group].object);
+    std::vector<Index> places;
+    for (Index k = 0; k < shared; ++k) places.push_back(k);
+    for (Index k = 0; k < width; ++k) places.push_back(shared + (own - objects.begin()) * width + k);
+    places.push_back(all);
+    out.push_back(MatrixXd::Zero(all + 1, all + 1));
+    out.back()(places, places) = parts[n];
+  }
   return out;
 }
 
@@ -243,32 +242,33 @@ std::optional<MissingAcceleration> missing_acceleration(const GroupedProblem& pr
   const auto shared = static_cast<Index>(fit.shared.size());
   const Form* best = nullptr;
   double best_gain = 0;
-  std::vector<Column> functions;
   std::vector<double> knots;
   std::vector<MatrixXd> parts;
   const auto all = forms();
-  std::vector<std::vector<std::string>> objects{{""}};  // one function of all, or one of each
-  if (auto each = objects_of(problem); each.size() > 1) objects.push_back(std::move(each));
+  const std::vector<std::string> each = objects_of(problem), together{""};
+  std::vector<std::string> objects;  // who has functions of their own: each, or all together
   for (const Form& form : all) {
     const auto at = knots_of(train, form);
     if (!(at.back() > at.front())) continue;
-    for (const auto& of : objects) {
-      auto tried = columns_of(form, of);
-      auto its = parts_of(problem, fit, train, form, tried, at, options);
-      const double gain = cross_validated(its, shared, tried.size());
-      if (!(gain > best_gain)) continue;
-      best = &form, best_gain = gain, functions = std::move(tried), knots = at, parts = std::move(its);
-    }
+    const auto take = [&](std::vector<MatrixXd> its, const std::vector<std::string>& of) {
+      const double gain = cross_validated(its, shared, of.size() * form.along.size());
+      if (!(gain > best_gain)) return;
+      best = &form, best_gain = gain, objects = of, knots = at, parts = std::move(its);
+    };
+    const auto its = parts_of(problem, fit, train, form, at, options);
+    take(its, together);
+    if (each.size() > 1) take(of_objects(its, shared, train, problem, each), each);
   }
   if (!best) return {};
-  const Estimate found = estimate(parts, shared, functions.size(), [](std::size_t) { return true; });
+  const std::size_t along = best->along.size(), functions = objects.size() * along;
+  const Estimate found = estimate(parts, shared, functions, [](std::size_t) { return true; });
   const VectorXd sigma = sigmas(parts, shared, found);
 
   MissingAcceleration out;
   out.of = best->of;
   out.against = best->of_speed ? "speed [m/s]" : "time [s]";
-  for (std::size_t c = 0; c < functions.size(); ++c) {
-    MissingComponent component{best->along[functions[c].along], functions[c].object, knots, {}, {}};
+  for (std::size_t c = 0; c < functions; ++c) {
+    MissingComponent component{best->along[c % along], objects[c / along], knots, {}, {}};
     double information = 0;
     for (std::size_t j = 0; j < knots.size(); ++j) {
       const auto k = static_cast<Index>(c * knots.size() + j);
@@ -278,7 +278,8 @@ std::optional<MissingAcceleration> missing_acceleration(const GroupedProblem& pr
     }
     if (information > 0) out.components.push_back(std::move(component));
   }
-  const auto judges = parts_of(problem, fit, test, *best, functions, knots, options);
+  auto judges = parts_of(problem, fit, test, *best, knots, options);
+  if (objects != together) judges = of_objects(judges, shared, test, problem, objects);
   double before = 0, gain = 0, left = 0, samples = 0;
   for (std::size_t n = 0; n < judges.size(); ++n) {
     const Index last = judges[n].rows() - 1;
