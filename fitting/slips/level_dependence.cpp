@@ -9,10 +9,12 @@
 #include <utility>
 
 #include "dynamics/dense_solve.hpp"
+#include "dynamics/parallel.hpp"
 
 namespace unhand::fitting {
 namespace {
 
+constexpr int kMostRounds = 20;  // of a surface in turn with what its level depends on
 constexpr LevelBy kQuestions[] = {LevelBy::viscous, LevelBy::stribeck, LevelBy::order, LevelBy::sense};
 
 /// Whether id `a` comes before `b`, numbers in them by their value: 2 before 10.
@@ -89,54 +91,27 @@ class LevelFit {
 
   double at(const Levels& levels, std::size_t i) const { return columns(levels, i).dot(x_); }
 
-  /// Sizes of `by` with their σ by the scatter between slips.
-  std::vector<Parameter> parameters(const Levels& levels, const std::vector<std::size_t>& rows,
-                                    LevelBy by) const {
+  /// How many numbers were fitted.
+  std::size_t unknowns() const {
+    const bool shaped = std::find(of_.begin(), of_.end(), LevelBy::stribeck) != of_.end();
+    return sides_.size() + (shaped ? 1 : 0);
+  }
+
+  /// The sizes of `by`, as level_dependence names them; of the sense one for each component of the wrench.
+  Eigen::VectorXd sizes(LevelBy by) const {
     const auto first = static_cast<Eigen::Index>(place(by));
-    const double a = x_[0], b = x_[first];
-    // Derivatives of the level by a, b, ... and the speed of Stribeck's law.
-    const bool shaped = by == LevelBy::stribeck;
-    const Eigen::Index n = x_.size() + (shaped ? 1 : 0);
-    Eigen::MatrixXd bread = Eigen::MatrixXd::Zero(n, n), meat = bread;
-    std::map<int, Eigen::VectorXd> of_slip;
-    for (const std::size_t i : rows) {
-      Eigen::VectorXd j(n);
-      j.head(x_.size()) = columns(levels, i);
-      if (shaped) {
-        const double u = levels.speed[i] / stribeck_speed_;
-        j[n - 1] = b * j[first] * 2 * u * u / stribeck_speed_;
-      }
-      bread += j * j.transpose();
-      const auto sum =
-          of_slip.try_emplace(levels.sample(i).slip, Eigen::VectorXd(Eigen::VectorXd::Zero(n))).first;
-      sum->second += (levels.level[i] - at(levels, i)) * j;
-    }
-    for (const auto& [slip, g] : of_slip) meat += g * g.transpose();
-    const double S = static_cast<double>(of_slip.size()), freedom = S - static_cast<double>(n);
-    if (!(freedom > 0)) return {};
-    meat *= S / freedom;
-    const Eigen::MatrixXd C = dynamics::congruent(dynamics::pseudo_inverse(bread), meat);
-    const auto relative = [&](Eigen::Index k) {  // σ of x_k/a
-      Eigen::VectorXd d = Eigen::VectorXd::Zero(n);
-      d[k] = 1 / a, d[0] = -x_[k] / (a * a);
-      return std::sqrt(std::max(0.0, d.dot(C * d)));
-    };
+    const Eigen::VectorXd relative =
+        x_.segment(first, static_cast<Eigen::Index>(width(by))) / x_[0];  // to the level without it
     switch (by) {
       case LevelBy::viscous:
-        return {{"1/v_0", "s/m", b / a, relative(first), freedom}};
-      case LevelBy::stribeck:
-        if (!(b > 0)) return {{"mu_s/mu_k", "-", 1, relative(first), freedom}};  // at no speed
-        return {{"mu_s/mu_k", "-", 1 + b / a, relative(first), freedom},
-                {"v_s", "m/s", stribeck_speed_, std::sqrt(std::max(0.0, C(n - 1, n - 1))), freedom}};
       case LevelBy::order:
-        return {{"change", "-", b / a, relative(first), freedom}};
+        return relative;
+      case LevelBy::stribeck:
+        return Eigen::Vector2d(1 + relative[0], stribeck_speed_);
       case LevelBy::sense:
         break;
     }
-    const Eigen::Vector3d odd = x_.segment<3>(first);
-    Eigen::VectorXd d = Eigen::VectorXd::Zero(n);
-    d.segment<3>(first) = 2 * odd.normalized() / a;  // one way against the other
-    return {{"change", "-", 2 * odd.norm() / a, std::sqrt(std::max(0.0, d.dot(C * d))), freedom}};
+    return 2 * relative;  // one way against the other
   }
 
  private:
@@ -256,43 +231,88 @@ Paired gain_of(const std::vector<Levels>& all, const Errors& before, const Error
   return out;
 }
 
-/// The surface in turn with what its level depends on: fitted to the wrenches without that.
-Levels in_turn(const SlipSamples& slips, const SlipSurface& fit, const std::vector<LevelBy>& of) {
-  constexpr int kMostRounds = 20;
-  constexpr double kAtRest = 1e-4;  // of a factor
-  Levels levels(slips, fit);
-  std::vector<double> factors(slips.samples.size(), 1.0);
-  double moved = HUGE_VAL;
-  for (int round = 0; round < kMostRounds && moved > kAtRest; ++round) {
-    const LevelFit dependence(levels, of, rows_where(levels, [](int) { return true; }));
-    SlipSamples level = slips;
-    moved = 0;
-    for (std::size_t i = 0; i < level.samples.size(); ++i) {
-      const double factor = dependence.at(levels, i);
-      if (!(factor > 0)) return levels;
-      moved = std::max(moved, std::abs(factor - std::exchange(factors[i], factor)));
-      for (double& w : level.samples[i].wrench) w /= factor;
-    }
-    const SurfaceFit again = fit_surface(level, fit.model);
-    if (!again.fitted()) return levels;
-    levels = Levels(slips, again.surface);
-  }
-  return levels;
+std::vector<std::size_t> all_rows(const Levels& levels) {
+  return rows_where(levels, [](int) { return true; });
 }
 
-/// Sizes of what was accepted on each surface, and what it leaves in sample.
-void add_sizes(const std::vector<Levels>& all, const std::vector<LevelBy>& accepted, LevelAnswer& out) {
-  for (const Levels& levels : all) {
-    const auto rows = rows_where(levels, [](int) { return true; });
-    const LevelFit fit(levels, accepted, rows);
-    for (LevelDependence& one : out.found)
-      for (Parameter p : fit.parameters(levels, rows, one.by)) {
-        p.name += "[" + levels.slips->surface + "]";
-        one.parameters.push_back(std::move(p));
+/// A surface in turn with what its level depends on: fitted to the wrenches without that.
+struct InTurn {
+  SlipSurface surface;
+  Levels levels;  ///< refers to the slips
+  LevelFit fit;
+
+  InTurn(const SlipSamples& slips, const SlipSurface& start, const std::vector<LevelBy>& of, int most_rounds)
+      : surface(start), levels(slips, start), fit(levels, of, all_rows(levels)) {
+    constexpr double kAtRest = 1e-4;  // of a factor
+    if (of.empty()) return;
+    std::vector<double> factors(slips.samples.size(), 1.0);
+    for (int round = 0; round < most_rounds; ++round) {
+      SlipSamples level = slips;
+      double moved = 0;
+      for (std::size_t i = 0; i < level.samples.size(); ++i) {
+        const double factor = fit.at(levels, i);
+        if (!(factor > 0)) return;
+        moved = std::max(moved, std::abs(factor - std::exchange(factors[i], factor)));
+        for (double& w : level.samples[i].wrench) w /= factor;
       }
-    Paired errors;
-    for (const std::size_t i : rows) errors.add(std::abs(levels.level[i] - fit.at(levels, i)));
-    out.after_train += errors.mean() / static_cast<double>(all.size());
+      if (moved <= kAtRest) return;
+      const SurfaceFit again = fit_surface(level, surface.model);
+      if (!again.fitted()) return;
+      surface = again.surface;
+      levels = Levels(slips, surface);
+      fit = LevelFit(levels, of, all_rows(levels));
+    }
+  }
+};
+
+/// The sizes of `by` with their σ: those of `without` are the same, each without a part of the slips.
+std::vector<Parameter> parameters(LevelBy by, const Eigen::VectorXd& sizes,
+                                  const std::vector<Eigen::VectorXd>& without, double freedom) {
+  const auto parts = static_cast<double>(without.size());
+  Eigen::VectorXd mean = Eigen::VectorXd::Zero(sizes.size());
+  for (const Eigen::VectorXd& one : without) mean += one / parts;
+  Eigen::MatrixXd C = Eigen::MatrixXd::Zero(sizes.size(), sizes.size());
+  for (const Eigen::VectorXd& one : without)
+    C += (parts - 1) / parts * (one - mean) * (one - mean).transpose();
+  const auto sigma = [&](const Eigen::VectorXd& along) { return std::sqrt(along.dot(C * along)); };
+  const auto sigma_of = [&](Eigen::Index k) { return sigma(Eigen::VectorXd::Unit(sizes.size(), k)); };
+  switch (by) {
+    case LevelBy::viscous:
+      return {{"1/v_0", "s/m", sizes[0], sigma_of(0), freedom}};
+    case LevelBy::stribeck:
+      if (!(sizes[0] > 1)) return {{"mu_s/mu_k", "-", 1, sigma_of(0), freedom}};  // at no speed
+      return {{"mu_s/mu_k", "-", sizes[0], sigma_of(0), freedom},
+              {"v_s", "m/s", sizes[1], sigma_of(1), freedom}};
+    case LevelBy::order:
+      return {{"change", "-", sizes[0], sigma_of(0), freedom}};
+    case LevelBy::sense:
+      break;
+  }
+  return {{"change", "-", sizes.norm(), sigma(sizes.normalized()), freedom}};
+}
+
+/// Sizes of what was accepted on one surface; the surface is fitted again without each part of the slips.
+void add_sizes(const SlipSamples& slips, const InTurn& whole, const std::vector<LevelBy>& accepted,
+               int threads, LevelAnswer& out) {
+  constexpr std::size_t kMostParts = 20;
+  constexpr int kRounds = 2;  // from where the whole rests: sigmas are within 2 % of those at rest
+  const std::size_t parts = std::min(kMostParts, slips.slips.size());
+  const double freedom = static_cast<double>(parts) - static_cast<double>(whole.fit.unknowns());
+  if (!(freedom > 0)) return;
+  std::vector<std::optional<LevelFit>> without(parts);
+  dynamics::parallel_for(parts, threads, [&](std::size_t part) {
+    SlipSamples rest = slips;
+    std::erase_if(rest.samples,
+                  [&](const SlipSample& s) { return static_cast<std::size_t>(s.slip) % parts == part; });
+    without[part] = InTurn(rest, whole.surface, accepted, kRounds).fit;
+  });
+  for (LevelDependence& one : out.found) {
+    std::vector<Eigen::VectorXd> sizes;
+    for (const auto& fit : without) sizes.push_back(fit->sizes(one.by));
+    for (Parameter p : parameters(one.by, whole.fit.sizes(one.by), sizes, freedom)) {
+      p.name += "[" + slips.surface + "]";
+      one.parameters.push_back(std::move(p));
+    }
   }
 }
 
@@ -358,10 +378,15 @@ LevelAnswer level_dependence(const std::vector<SlipSamples>& slips, const std::v
     now = std::move(best_errors);
   }
   out.after = now.mean;
-  std::vector<Levels> sized;
-  for (std::size_t k = 0; k < all.size(); ++k)
-    sized.push_back(accepted.empty() ? all[k] : in_turn(slips[which[k]], fits[which[k]], accepted));
-  add_sizes(sized, accepted, out);
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    const SlipSamples& of = slips[which[k]];
+    const InTurn whole(of, fits[which[k]], accepted, kMostRounds);
+    Paired errors;
+    for (std::size_t i = 0; i < whole.levels.level.size(); ++i)
+      errors.add(std::abs(whole.levels.level[i] - whole.fit.at(whole.levels, i)));
+    out.after_train += errors.mean() / static_cast<double>(all.size());
+    if (!accepted.empty()) add_sizes(of, whole, accepted, options.comparison.threads, out);
+  }
   return out;
 }
 

@@ -40,9 +40,9 @@ struct LevelAnswer {
 /// with none, the one that lowers the held-out error most is accepted, given those before it, where it does
 /// so by a one-sided paired t-test (every slip one observation, predicted by the slips of the other folds;
 /// `family_wise_level` is shared among the questions) and by `matters`; one effect of speed at most. Sizes
-/// are fitted in turn with the surface, to the wrenches without them, until both rest; σ by the scatter
-/// between slips, without what the surface's fit takes up: too small where slips are few. Surfaces with fewer
-/// than two slips a fold are left out. `fits`: one per entry of `slips`.
+/// are fitted in turn with the surface, to the wrenches without them, until both rest; their σ say how they
+/// change where both are fitted again without a twentieth of the slips, each in turn (a jackknife). Surfaces
+/// with fewer than two slips a fold are left out. `fits`: one per entry of `slips`.
 LevelAnswer level_dependence(const std::vector<SlipSamples>& slips, const std::vector<SlipSurface>& fits,
                              const SurfaceDiscoveryOptions& options);
 
