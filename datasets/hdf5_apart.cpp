@@ -173,6 +173,7 @@ void read_apart(const std::string& file, const std::function<Send(Place&)>& read
     Descriptor in(ends[1]);
     out.take(ends[0]);
     if (id == 0) {
+      out.close();  // where the parent is gone, nobody reads, and the next write ends the child
       settle(limits, in_use);
       PipeWriter pipe(in.number());
       try {

@@ -24,9 +24,6 @@ using dynamics::Dual;
 
 namespace {
 
-/// Above what a clock that counts from 1970 rounds its times to [s]: a sample at an event stays on its side.
-constexpr double kClockRounding = 1e-6;
-
 /// One pad's wrench while it slips, over its normal force: force, force, torque.
 struct SlipSample {
   std::array<double, 3> ratio{}, sigma{};  ///< -, -, m; 1 σ

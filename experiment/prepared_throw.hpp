@@ -23,6 +23,9 @@ struct MeasuredOutcome {
   std::optional<double> landing_x, landing_theta;       ///< m, rad (unwrapped)
 };
 
+/// Above what a clock that counts from 1970 rounds its times to [s]: what is at an event stays on its side.
+inline constexpr double kClockRounding = 1e-6;
+
 /// A logged throw, ready to be simulated.
 struct PreparedThrow {
   std::string id, object, condition;  ///< as in the log

@@ -153,7 +153,7 @@ bool grip_holds(const PreparedThrow& prepared, const ThrowModel& model, const Va
   const auto read = [&](const auto&, const auto&, const release::ReleaseResult<double>& result) {
     return !result.slips_at_start &&
            std::none_of(result.events.begin(), result.events.end(), [&](const auto& event) {
-             return event.mode_after != event.mode_before && event.t < prepared.open_command;
+             return event.mode_after != event.mode_before && event.t < prepared.open_command - kClockRounding;
            });
   };
   return with_release(prepared, model, values, false, read);

@@ -1,6 +1,7 @@
 // The process that reads HDF5 files: whatever becomes of it, its parent has an answer and keeps what is its
 // own.
 #include <gtest/gtest.h>
+#include <poll.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -9,6 +10,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <thread>
+#include <vector>
 
 #include "datasets/hdf5_apart.hpp"
 #include "datasets/hdf5_handles.hpp"
@@ -111,6 +113,33 @@ TEST(ReadApart, ChildrenThatNobodyWaitsForAreNoError) {
 }
 
 // What is sent half is not taken for whole, and neither is nonsense.
+// A parent that is killed while it reads leaves nothing behind: both of the pipe's writers end, and its
+// reader comes to the end.
+TEST(ReadApart, ADeadParentsReaderEnds) {
+  int ends[2];
+  ASSERT_EQ(::pipe(ends), 0);
+  const pid_t parent = ::fork();
+  if (parent == 0) {
+    ::close(ends[0]);
+    hdf5::read_apart(
+        "some.h5",
+        [](Place&) {
+          return [](PipeWriter& pipe) {
+            std::vector<double> more(1 << 20);  // than any pipe holds
+            carry(pipe, more);
+          };
+        },
+        [](PipeReader&) { ::raise(SIGKILL); });
+    ::_exit(0);
+  }
+  ::close(ends[1]);
+  ASSERT_GT(parent, 0);
+  EXPECT_EQ(::waitpid(parent, nullptr, 0), parent);
+  pollfd reader{ends[0], POLLIN, 0};
+  EXPECT_EQ(::poll(&reader, 1, 10000), 1) << "a child still holds its end after 10 s";
+  ::close(ends[0]);
+}
+
 TEST(ReadApart, HalfAnAnswerIsNone) {
   for (const int kind : {0, 1, 2}) {
     const auto send = [kind](PipeWriter& pipe) {

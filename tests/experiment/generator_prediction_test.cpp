@@ -133,4 +133,28 @@ TEST(GeneratorAndPrediction, AgreeThroughTheSmoothedLogOnlyIfTheEffectIsKnown) {
   }
 }
 
+// What begins to slip as the pads open, or a rounding of the clock before that, was held.
+TEST(GripHolds, UntilTheGripperIsToldToOpen) {
+  const CampaignDesign design = perfect();
+  datasets::ThrowLog log = campaign_header(design, kSeed);
+  log.throws = {generate_throw(design, kSeed, kThrow).record};
+  PreparedThrow prepared = prepare(log, log.throws[0], "(in memory)");
+  const ThrowModel model{design.contact_model, log.gripper->n_pads, design.reference_force(),
+                         design.integrator};
+  const std::vector<std::string> names{"mu", "length"};
+  const std::vector<double> numbers{0.5, 0.007};
+  const dynamics::Values<double> values(names, numbers);
+  EXPECT_TRUE(grip_holds(prepared, model, values));
+  double slips = 0;
+  visit_release(prepared, model, values, [&](const auto&, const auto& release) {
+    for (const auto& event : release.events)
+      if (slips == 0 && event.mode_after != event.mode_before) slips = event.t;
+  });
+  ASSERT_GT(slips, 0);
+  prepared.open_command = std::nextafter(slips, 1.0);
+  EXPECT_TRUE(grip_holds(prepared, model, values));
+  prepared.open_command = slips + 1e-3;
+  EXPECT_FALSE(grip_holds(prepared, model, values));
+}
+
 }  // namespace
