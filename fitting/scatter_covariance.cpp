@@ -24,16 +24,18 @@ ScatterCovariance scatter_covariance(const std::vector<Cluster>& clusters, const
 
   std::vector<Eigen::MatrixXd> share, adjust;
   const Eigen::MatrixXd known = congruent(whiten.transpose(), prior);  // a measurement whose noise is certain
-  Eigen::MatrixXd G = known;
+  Eigen::MatrixXd G = known, unseen = Eigen::MatrixXd::Zero(width, width);
   for (const Cluster& part : clusters) {
     share.push_back(congruent(whiten.transpose(), part.information));
     constexpr double kLeastRest = 0.1;  // one that alone determines a direction leaves no residual there
     const Spectrum own = spectrum_of(share.back());
-    const Eigen::VectorXd rest = (1 - own.values.array()).cwiseMax(kLeastRest).rsqrt();
-    adjust.push_back(congruent(own.vectors, rest.asDiagonal()));
+    const Eigen::ArrayXd rest = 1 - own.values.array(), counted = rest.cwiseMax(kLeastRest);
+    adjust.push_back(congruent(own.vectors, counted.rsqrt().matrix().asDiagonal()));
+    unseen += congruent(own.vectors, (own.values.array() * (1 - rest / counted)).matrix().asDiagonal());
     const Eigen::VectorXd g = adjust.back() * (whiten.transpose() * part.gradient);
     G += g * g.transpose();
   }
+  G += unseen;
   ScatterCovariance out;
   out.noise = gram(whiten.transpose());
   const auto n = static_cast<Eigen::Index>(share.size());
@@ -50,8 +52,8 @@ ScatterCovariance scatter_covariance(const std::vector<Cluster>& clusters, const
     }
     Eigen::MatrixXd B = -gram(shared);
     for (Eigen::Index i = 0; i < n; ++i) B(i, i) += toward.col(i).dot(shared.col(i));
-    const double trace = B.trace() + c.dot(known * c);
-    if (const double square = B.squaredNorm(); trace > 0)
+    const double alone = c.dot(unseen * c), trace = B.trace() + c.dot(known * c) + alone;
+    if (const double square = B.squaredNorm() + alone * alone; trace > 0)
       out.degrees_of_freedom[k] = std::clamp(trace * trace / std::max(square, 1e-300), 1.0, kCertain);
   }
   Spectrum scatter = spectrum_of(G);

@@ -144,6 +144,26 @@ TEST(ScatterCovariance, ThrowsThatAgreeTooWellAreNotQuiteBelieved) {
 
 // One size from twenty groups, another from one to three, all of which scatter five times as much as their
 // noise says: a single one cannot tell that by itself.
+// One throw, which the fit follows, does not scatter: what it says is as sure as its noise, and not surer for
+// what is known beforehand of something else or of the same. Between that and three throws alike, nothing
+// jumps.
+TEST(ScatterCovariance, OneThrowAloneIsAsSureAsItsNoise) {
+  NormalEquations equations;
+  ThrowEquations only;
+  only.information = Eigen::Matrix2d{{100, 3}, {3, 4}};
+  only.gradient = Eigen::Vector2d::Zero();
+  equations.information = only.information;
+  equations.throws = {only};
+  for (const double known : {0.0, 1e-4, 0.01, 0.1}) {
+    const Eigen::MatrixXd prior = Eigen::Vector2d(0, known).asDiagonal();
+    const auto found = scatter_covariance(equations, prior);
+    const Eigen::Matrix2d noise = (only.information + prior).inverse();
+    EXPECT_NEAR(found.covariance(0, 0), noise(0, 0), 0.02 * noise(0, 0)) << known;
+    EXPECT_NEAR(found.covariance(1, 1), noise(1, 1), 0.2 * noise(1, 1)) << known;
+    EXPECT_LT(found.degrees_of_freedom[0], 2) << known;
+  }
+}
+
 TEST(ScatterCovariance, FewGroupsBorrowTheScatterOfMany) {
   constexpr int kMany = 20, kDraws = 1000;
   constexpr double kScatter = 5;
