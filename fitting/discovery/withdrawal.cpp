@@ -22,6 +22,13 @@ bool is_unloaded(Channel channel, Phase phase) {
   return in_air(phase) && (is_wrench(channel) || channel == Channel::normal_force);
 }
 
+/// Whether the base left as much in the other throws of what is left here, or nearly: else these show
+/// something that those do not, which no effect that was fitted to those can have imitated.
+bool is_left_by_base(const std::vector<ChannelMisfit>& other, const ChannelMisfit& m) {
+  return is_confirmed(other, m) &&
+         misfit_in(other, m.channel, m.phase) - 1 >= kAsMuch * (m.chi2_per_sample() - 1);
+}
+
 /// Whether an unloaded sensor has shown that an effect is its own: of what the base left in this channel in
 /// the air, no more than kLeft is there now.
 bool is_shown_unloaded(Channel channel, const std::vector<ChannelMisfit>& base,
@@ -33,8 +40,8 @@ bool is_shown_unloaded(Channel channel, const std::vector<ChannelMisfit>& base,
 }
 
 /// The first channel in which too much is left, or none: in the half of the throw where an effect acts, or in
-/// a channel that it `explains`, of what the base model's fit left there in the other throws (`other`: train
-/// against held-out ones) as well; and not next to nothing of what the base left in that phase's worst
+/// a channel that it `explains`, where the base model's fit left as much in the other throws (`other`: train
+/// against held-out ones); and not next to nothing of what the base left in that phase's worst
 /// channel; for an effect on the pads, which flights and landings show as well, what is left in the hand, in
 /// any phase's; for an effect that acts everywhere, in the other half only a channel that it `worsens`. One
 /// throw alone, of which a sample may lie where the wrench jumps, is not much.
@@ -69,7 +76,7 @@ const ChannelMisfit* too_much_left(const AcceptedEffect& effect, const std::vect
                                               kNextToNothing * (worst(m.phase) - 1));
   };
   const auto found = std::find_if(now.begin(), now.end(), [&](const ChannelMisfit& m) {
-    return is_much(m) && is_much(m.without_worst()) && is_confirmed(other, m) && answers_for(m);
+    return is_much(m) && is_much(m.without_worst()) && is_left_by_base(other, m) && answers_for(m);
   });
   return found == now.end() ? nullptr : &*found;
 }

@@ -17,6 +17,10 @@ inline constexpr double kLeft = 0.1;
 /// the pads leave in the hand is held against the worst channel of any phase.
 inline constexpr double kNextToNothing = 0.01;
 
+/// Of what is left in a channel on train or held-out throws, the share that the base model must have left
+/// there in the others, too.
+inline constexpr double kAsMuch = 0.5;
+
 /// Of the misfit without a sensor's effect, the share below which the effect explains a channel in a phase.
 inline constexpr double kExplains = 0.5;
 /// Whether so little of the misfit `without` an effect is left, `now` that it is there.
