@@ -9,6 +9,7 @@
 
 #include "apps/command.hpp"
 #include "apps/output.hpp"
+#include "apps/tell.hpp"
 #include "contact/gripper_delay.hpp"
 #include "contact/patch.hpp"
 #include "contact/registry.hpp"
@@ -97,8 +98,14 @@ std::vector<NamedValue> named_values(const experiment::ModelComparison& model) {
   return out;
 }
 
+datasets::ModelCard read_card(const fs::path& file) {
+  datasets::ModelCard card = datasets::read_model_card(file);
+  for (const std::string& warning : card.warnings) tell("unhand: {}: {}\n", file.string(), warning);
+  return card;
+}
+
 UsableCard read_usable_card(const fs::path& file) {
-  UsableCard out{datasets::read_model_card(file), file.string(), false, {}};
+  UsableCard out{read_card(file), file.string(), false, {}};
   Reader reader(file.string(), out.card);
   if (fitting::is_of_free_motion(out.card))
     reader.fail("/model",

@@ -24,6 +24,9 @@ std::vector<NamedValue> named_values(const std::string& model, const experiment:
 /// Those of a fitted model where it is one.
 std::vector<NamedValue> named_values(const experiment::ModelComparison& model);
 
+/// A card; says on stderr what its fit warned of. Throws datasets::CardError where it cannot be read.
+datasets::ModelCard read_card(const std::filesystem::path& file);
+
 /// A card whose model and parameters are ones of experiment::predict or, if it comes from a fit, of
 /// fitting::predict_throws.
 struct UsableCard {

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "apps/cards.hpp"
 #include "apps/command.hpp"
 #include "apps/compare.hpp"
 #include "apps/figure.hpp"
@@ -32,7 +33,7 @@ void compare_with_card(const CompareRequest& request, const datasets::ThrowLog& 
   if (request.cards.size() != 1)
     throw WrongUsage("free flights and falls are compared with one --card at a time");
   const std::string& file = request.cards.front();
-  const auto card = datasets::read_model_card(file);
+  const auto card = read_card(file);
   if (!request.models.empty() && request.models != std::vector{card.model})
     throw WrongUsage(fmt::format("{}: a card for '{}', which is not what --models names", file, card.model));
   if (!request.write_cards.empty())

@@ -189,9 +189,11 @@ void discover(const DiscoverOptions& options, const Parser& parser) {
   Outputs outputs{{options.log}};
   const Json json = discovery_json(found, options.log, options.model);
   if (!options.json.empty()) outputs.json(options.json, json);
-  if (!options.card.empty())
-    outputs.text(options.card,
-                 datasets::to_json(card_of(problem, found.after.fit, errors, options.log, log)));
+  if (!options.card.empty()) {
+    datasets::ModelCard card = card_of(problem, found.after.fit, errors, options.log, log);
+    if (found.unexplained) card.warnings = {"unexplained: " + found.unexplained->description};
+    outputs.text(options.card, datasets::to_json(card));
+  }
   if (!options.report.empty())
     write_discovery_report(found, options.log, origin_text(log), command, json,
                            outputs.directory(options.report));

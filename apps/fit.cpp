@@ -55,6 +55,7 @@ datasets::ModelCard made_card(const FitAnswer& answer, const FitRequest& request
       if (const auto s = answer.cross_validation->statistics(q); s.n > 0)
         errors[experiment::kQuantities[q].key] = {s.n, s.mae, s.std, s.bias};
   }
+  card.warnings = fit_warnings(answer, request);
   return card;
 }
 

@@ -9,6 +9,7 @@
 #include <memory>
 #include <numbers>
 
+#include "apps/cards.hpp"
 #include "apps/command.hpp"
 #include "apps/figure.hpp"
 #include "apps/flip_store.hpp"
@@ -122,9 +123,8 @@ std::unique_ptr<fl::FlipLearner> learner_of(const PlanFlipOptions& o, const fl::
   answer.known = fl::transferred(support.data, shift);
   fl::HandLibrary old(robot, robot.bar, 2);
   const planners::ReleaseCard prior =
-      o.card.empty()
-          ? fl::prior_card(robot)
-          : planners::release_card(datasets::read_model_card(o.card), o.card, fl::prior_card(robot));
+      o.card.empty() ? fl::prior_card(robot)
+                     : planners::release_card(read_card(o.card), o.card, fl::prior_card(robot));
   if (!prior.effects.empty())
     throw datasets::CardError(
         o.card, "/effects",

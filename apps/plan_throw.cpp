@@ -12,6 +12,7 @@
 #include <random>
 #include <tuple>
 
+#include "apps/cards.hpp"
 #include "apps/command.hpp"
 #include "apps/figure.hpp"
 #include "apps/numbers.hpp"
@@ -335,7 +336,7 @@ void plan_throw(const PlanThrowOptions& options) {
   std::optional<planners::ReleaseCard> card;
   datasets::ModelCard read;
   if (!options.card.empty()) {
-    read = datasets::read_model_card(options.card);
+    read = read_card(options.card);
     card = planners::release_card(read, options.card);
   }
   const auto given = sku_of(options);

@@ -240,6 +240,7 @@ ModelCard parse_model_card(const std::string& text, const std::string& file) {
     root.keep("errors", *errors);
   }
   read_parts(root, "valid_range", card.valid_range, read_range);
+  card.warnings = root.texts("warnings");
   card.library_version = root.required("library_version", root.text("library_version"));
   if (!root.rest().empty()) card.extra = root.rest().dump();
   return card;
@@ -317,6 +318,7 @@ std::string to_json(const ModelCard& card) {
     for (const auto& [name, r] : card.valid_range)
       ranges[name] = {{"low", r.low}, {"high", r.high}, {"unit", r.unit}};
   }
+  if (!card.warnings.empty()) out["warnings"] = card.warnings;
   out["library_version"] = card.library_version;
   if (!card.extra.empty()) add_missing(out, parse_json(card.extra, "(extra keys of a card)"), true);
   std::string text;

@@ -78,6 +78,7 @@ struct CardRange {
 ///    "split": "train",
 ///    "errors": {"test": {"landing_x_m": {"n": 90, "mae": 0.003, "std": 0.002, "bias": 0.0}, ...}, ...},
 ///    "valid_range": {"grip_force": {"low": 45, "high": 55, "unit": "N"}, ...},
+///    "warnings": ["the fit stopped before it had converged: ..."],
 ///    "library_version": "0.1.0"}
 /// Required: schema, schema_version, model, parameters (value and unit of each), log (file), library_version.
 struct ModelCard {
@@ -92,7 +93,8 @@ struct ModelCard {
   /// By split ("train", "test", "cross_validation"), then by quantity.
   std::map<std::string, std::map<std::string, CardStatistics>> errors;
   std::map<std::string, CardRange> valid_range;  ///< by condition: "grip_force", ...
-  std::string library_version;                   ///< that wrote the card
+  std::vector<std::string> warnings;  ///< of the fit: why its values are not to be trusted as they are
+  std::string library_version;        ///< that wrote the card
   /// Keys that this version does not know, as the text of a JSON object in the card's own structure; they
   /// return to their places when the card is written. Empty: none.
   std::string extra;

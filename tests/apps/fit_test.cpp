@@ -57,12 +57,14 @@ TEST_F(Cli, PredictSaysWhereTheCardWasMissedByFarMoreThanItsSigmas) {
 }
 
 // A fit converges whatever the model lacks; its intervals know nothing of that.
-TEST_F(Cli, FitWarnsOfWhatTheModelLacksInTheReportAndTheJsonToo) {
+TEST_F(Cli, FitWarnsOfWhatTheModelLacksInReportJsonAndCard) {
   ASSERT_EQ(run("generate quick12 --seed 3 --effect flight.quadratic_drag=0.3 --out windy.h5").code, 0);
   for (const bool windy : {true, false}) {
     const std::string log = windy ? "windy.h5" : quick;
-    const Answer answer = run("fit " + log + " --model limit_surface_disc --report r --json f.json");
+    const Answer answer =
+        run("fit " + log + " --model limit_surface_disc --report r --json f.json --card c.json");
     ASSERT_EQ(answer.code, 0) << answer.err;
+    const Answer predicted = run("predict " + quick + " --card c.json");
     const std::string report = content(folder / "r/report.md");
     json fitted = read_json(folder / "f.json");
     EXPECT_EQ(fitted["warnings"].empty(), !windy) << fitted["warnings"];
@@ -70,6 +72,7 @@ TEST_F(Cli, FitWarnsOfWhatTheModelLacksInTheReportAndTheJsonToo) {
     for (const auto& warning : fitted["warnings"]) {
       EXPECT_THAT(answer.err, HasSubstr("unhand: " + warning.get<std::string>() + "\n"));
       EXPECT_THAT(report, HasSubstr("\n\nwarning: " + warning.get<std::string>() + "\n\n"));
+      EXPECT_THAT(predicted.err, HasSubstr("unhand: c.json: " + warning.get<std::string>() + "\n"));
     }
     EXPECT_FALSE(fitted["notes"].empty());
     for (const auto& note : fitted["notes"]) {

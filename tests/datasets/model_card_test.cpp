@@ -30,6 +30,7 @@ ModelCard small_card() {
   card.log = {"campaign.h5", "a campaign", "fnv1a64:0123456789abcdef", {"aluminium", "glass"}};
   card.split = "train";
   card.valid_range["grip_force"] = {45, 55, "N"};
+  card.warnings = {"something is missing"};
   card.library_version = "0.1.0";
   return card;
 }
@@ -83,9 +84,11 @@ TEST(ModelCard, LeavesOutWhatIsNotKnown) {
   card.log.surfaces.clear();
   card.split.reset();
   card.valid_range.clear();
+  card.warnings.clear();
   auto json = nlohmann::json::parse(to_json(card));
   EXPECT_FALSE(json.contains("split"));
   EXPECT_FALSE(json.contains("valid_range"));
+  EXPECT_FALSE(json.contains("warnings"));
   EXPECT_FALSE(json["log"].contains("checksum"));
   EXPECT_FALSE(json["log"].contains("surfaces"));
   EXPECT_FALSE(json["parameters"]["length"].contains("sigma"));
