@@ -133,7 +133,8 @@ BiasTrial try_bias(const std::vector<SlipSamples>& surfaces, std::size_t k, cons
   out.ranked.p_value = out.with.gain.p();
   out.ranked.held_out_gain = gain, out.ranked.delta_bic = out.with.gain.delta_bic();
   const bool significant = out.with.gain.p() < options.family_wise_level;
-  out.convinces = significant && gain > options.matters * out.with.base_error;
+  const bool spoils_level = out.with.level > out.without.level;  // which the sensor's own zero would not
+  out.convinces = significant && gain > options.matters * out.with.base_error && !spoils_level;
   if (significant) out.ranked.fate = out.convinces ? Fate::outdone : Fate::too_small;
   return out;
 }

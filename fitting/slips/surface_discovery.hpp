@@ -58,8 +58,9 @@ struct SurfaceDiscovery {
 ///
 /// A bias of the wrenches, one of all surfaces, is asked for beside the law that is believed, with each
 /// fold's bias from the other folds: it is accepted if its three numbers differ from zero (Hotelling's T² by
-/// the scatter between slips) and the direction error falls by the same t-test and share. The laws are then
-/// asked again of the wrenches without it.
+/// the scatter between slips) and the direction error falls by the same t-test and share, while the forces
+/// come no farther from the surface (the mean |level − 1| of its fit does not rise). The laws are then asked
+/// again of the wrenches without it.
 SurfaceDiscovery discover_surfaces(const std::vector<SlipSamples>& surfaces,
                                    const SurfaceDiscoveryOptions& options);
 /// Throws datasets::LogError for a log that datasets::validate does not take.

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <random>
 
 #include "datasets/import_planar_pushes.hpp"
 #include "fitting/slips/surface_discovery.hpp"
@@ -180,6 +181,26 @@ TEST(WrenchBias, IsNamedWhereItIsAndNowhereElse) {
   EXPECT_THAT(found_ids(forgotten), testing::Not(testing::Contains("sensor.ft_bias")));
 }
 
+// Directions as a bias would bend them, and forces as without it: evident, and no bias of the sensor's.
+TEST(WrenchBias, DirectionsAloneDoNotNameIt) {
+  const SlipSurface surface = ellipsoid(unequal_axes);
+  SlipSamples bent = simulate(surface, 60, 0, 0.1, 7);
+  const SlipSamples biased = without_bias(bent, 2 * sensor_bias);
+  std::mt19937_64 random(16);
+  for (std::size_t i = 0; i < bent.samples.size(); ++i) {
+    const auto n = surface.normal(biased.samples[i].wrench);
+    const Vector3d u = (Vector3d(n[0], n[1], n[2]) + 0.1 * gauss(random)).normalized();
+    bent.samples[i].direction = {u[0], u[1], u[2]};
+  }
+  const auto found = discover_surfaces(std::vector{bent}, one_draw());
+  EXPECT_THAT(found_ids(found), testing::Not(testing::Contains("sensor.ft_bias")));
+  for (const Ranked& one : found.answer.ranking) {
+    if (one.id == kWrenchBias) {
+      EXPECT_LT(one.p_value, 1e-6);
+    }
+  }
+}
+
 TEST(WrenchBias, StandsBesideAnotherLaw) {
   const SlipSurface rounder = quartic(contact::ConvexQuartic::isotropic_blend(2.8), 4.0);
   const auto found = discover_surfaces(std::vector{with_bias(rounder, 60, 0.05, 5)}, one_draw());
@@ -198,6 +219,9 @@ TEST(WrenchBias, MeasuredPushesHaveNoneButAnAddedOne) {
   auto options = one_draw();
   options.comparison.null_draws = 0;
   EXPECT_THAT(found_ids(discover_surfaces(measured, options)), ElementsAre("contact.law:convex_quartic"));
+  const char* const three_feet = "wood_30_63.33_43.33_30_43.33_63.33";
+  const std::vector alone{slip_samples(three_feet, log.surfaces.at(three_feet))};
+  EXPECT_THAT(found_ids(discover_surfaces(alone, options)), IsEmpty());
   const Vector3d added(1.0, 0.5, 0);
   const auto found = discover_surfaces(without_bias(measured, -added), options);
   EXPECT_THAT(found_ids(found), ElementsAre("sensor.ft_bias", "contact.law:convex_quartic"));
