@@ -114,7 +114,10 @@ std::string split_text(const MeasuredResult& result) {
 }
 
 std::string first_text(const MeasuredDiscovery& found) {
-  if (!found.first.any) return "No channel leaves the noise.";
+  if (!found.first.any)
+    return found.unexplained && found.unexplained->chi2_per_dof > 1
+               ? "The train groups are too few to tell where the residual leaves the noise."
+               : "No channel leaves the noise.";
   if (found.first.time > 0)
     return fmt::format(
         "The residual {}: a start fitted to the samples up to there leaves {:.3g} times the variance of the "

@@ -58,6 +58,20 @@ std::optional<MeasuredUnexplained> slow_error(const MeasuredDiscovery& out) {
   return found;
 }
 
+/// What neighbouring residuals say of what is left.
+std::string in_words(const Autocorrelation& a) {
+  constexpr double kSurely = 3, kPerhaps = 1.5;  // standard deviations of white noise
+  if (std::abs(a.z) > kSurely)
+    return fmt::format(
+        "; neighbouring residuals correlate by {:.2f}: a slow error of the model or the sensor", a.lag1);
+  if (std::abs(a.z) > kPerhaps)
+    return fmt::format(
+        "; neighbouring residuals correlate by {:.2f}, {:.1f} standard deviations of white noise: too few to "
+        "tell a slow error from more noise than was declared",
+        a.lag1, std::abs(a.z));
+  return "; neighbouring residuals do not correlate: more noise than was declared";
+}
+
 void look_for_the_unexplained(const GroupedProblem& problem, const GroupedFit& held_out,
                               const MeasuredOptions& options, MeasuredDiscovery& out) {
   const auto& names = problem.channels();
@@ -85,13 +99,7 @@ void look_for_the_unexplained(const GroupedProblem& problem, const GroupedFit& h
   u.description = fmt::format("{} in {}: {:.3g} times the variance of the noise is left on held-out groups",
                               u.channel, out.phase, u.chi2_per_dof);
   for (const auto& a : out.autocorrelation_after)
-    if (a.channel == u.channel)
-      u.description +=
-          std::abs(a.z) > 3
-              ? fmt::format(
-                    "; neighbouring residuals correlate by {:.2f}: a slow error of the model or the sensor",
-                    a.lag1)
-              : std::string("; neighbouring residuals do not correlate: more noise than was declared");
+    if (a.channel == u.channel) u.description += in_words(a);
   const ResidualProfile* largest = nullptr;
   for (const auto& p : out.profile_after)
     if (p.channel == u.channel && (!largest || std::abs(p.z) > std::abs(largest->z))) largest = &p;
