@@ -1,8 +1,12 @@
 #include <fmt/core.h>
 
+#include <Eigen/Core>
 #include <algorithm>
+#include <numeric>
 #include <string>
+#include <vector>
 
+#include "dynamics/parallel.hpp"
 #include "fitting/discovery/left_over.hpp"
 #include "fitting/discovery/misfit_rules.hpp"
 
@@ -50,6 +54,31 @@ std::string held_by(const Stage& stage, const FitResult& half, const ChannelMisf
   return one && no_other ? fmt::format("{} ({})", names, condition) : names;
 }
 
+/// χ² per sample that the parameters' covariance alone makes of a held-out misfit: few train throws tell them
+/// badly, and what is held out is then off without anything being wrong with it.
+double by_parameters(const Stage& stage, const ChannelMisfit& m, int threads) {
+  const std::vector<double> campaign = stage.fit.values();
+  const auto width = static_cast<Eigen::Index>(campaign.size());
+  const Eigen::Map<const Eigen::MatrixXd> covariance(stage.fit.covariance.data(), width, width);
+  const auto& throws = stage.problem.throws();
+  std::vector<double> sum(throws.size()), count(throws.size());
+  dynamics::parallel_for(throws.size(), threads, [&](std::size_t i) {
+    const ThrowFit& fitted = stage.held_out.throws[i];
+    if (!fitted.used) return;
+    const Linearisation l = stage.problem.linearise(throws[i], campaign, fitted.own, DerivativesBy::all);
+    if (!l.solved) return;
+    const double release = throws[i].release_or(fitted.detach);
+    for (std::size_t j = 0; j < throws[i].observed.all.size(); ++j) {
+      const auto& o = throws[i].observed.all[j];
+      if (o.channel != m.channel || phase_of(o, throws[i].opening, release) != m.phase) continue;
+      const Eigen::VectorXd slope = l.campaign.row(static_cast<Eigen::Index>(j));
+      sum[i] += slope.dot(covariance * slope), count[i] += 1;
+    }
+  });
+  const double n = std::accumulate(count.begin(), count.end(), 0.0);
+  return n > 0 ? std::accumulate(sum.begin(), sum.end(), 0.0) / n : 0;
+}
+
 /// Effects beside which most of a held-out misfit vanishes, though the train throws alone do not show them
 /// surely enough.
 std::string suspects(const Unexplained& left, const Discovery& so_far) {
@@ -74,8 +103,11 @@ std::optional<Unexplained> left_in_one_half(const Stage& stage, const Discovery&
     for (const ChannelMisfit& m : half.misfit) {
       const ChannelMisfit* there = find_misfit(other.misfit, m.channel, m.phase);
       if (!is_misfit(m, options) || (there && is_left(*there, options))) continue;
-      if (m.chi2_per_sample() < kFar * unexplained_from(m.channel, m.phase, false, options)) continue;
+      const double from = unexplained_from(m.channel, m.phase, false, options);
+      if (m.chi2_per_sample() < kFar * from) continue;
       if (out && m.chi2_per_sample() <= out->chi2_per_dof) continue;
+      if (!train && m.chi2_per_sample() < kFar * (from + by_parameters(stage, m, options.fit.threads)))
+        continue;
       out = Unexplained{m.phase, m.channel, m.chi2_per_sample(), {}, {}};
       out->description = fmt::format(
           "{} in {}: {:.3g} times the variance of the noise in the {} throws, {:.3g} times in the {} ones; "
