@@ -82,6 +82,19 @@ TEST_F(Cli, FitWarnsOfWhatTheModelLacksInReportJsonAndCard) {
   }
 }
 
+// One landing that was read half a metre off is one reading: the model and the other throws are well.
+TEST_F(Cli, FitSaysThatAWildReadingIsOfOneThrow) {
+  write_changed("wild.h5", [](datasets::Throw& one) {
+    if (one.id == "001") one.landing->pose(0, 0) += 0.5;
+  });
+  const Answer answer = run("fit wild.h5 --model limit_surface_disc");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  EXPECT_THAT(answer.err, HasSubstr("landing.x (landing) is off by"));
+  EXPECT_THAT(answer.err, HasSubstr("nearly all of it in one throw"));
+  EXPECT_THAT(answer.err, Not(HasSubstr("something is missing")));
+  EXPECT_THAT(answer.err, Not(HasSubstr("Another unit")));
+}
+
 TEST_F(Cli, FitThenPredict) {
   const Answer answer =
       run("fit " + quick + " --model limit_surface_disc --card c.json --json f.json --report r");
