@@ -224,8 +224,8 @@ TEST(Unexplained, OneLandingThatIsOffIsNamed) {
 
 // A tracker that smooths its poses is late wherever the motion is even, and takes a late clock's place in the
 // air; in the grasp, where the hand's acceleration changes, a fifth of the misfit stays.
-// Eight landings tell six unknowns of the release badly: the four that are held out are missed by as much, and
-// nothing is wrong with them.
+// Eight landings tell six unknowns of the release badly: the four that are held out are missed by as much,
+// and nothing is wrong with them.
 TEST(Unexplained, LandingsThatFewOthersPredictAreNotWrong) {
   experiment::CampaignDesign design = experiment::campaign_design("quick12");
   design.sensors.ft = design.sensors.mocap = false;
