@@ -27,6 +27,7 @@
 #include "planners/arm/chain_file.hpp"
 #include "planners/arm/panda.hpp"
 #include "planners/tube/planar_hand.hpp"
+#include "planners/tube/planar_joints.hpp"
 #include "planners/tube/robust_throw.hpp"
 
 namespace unhand::apps {
@@ -85,20 +86,27 @@ Chain armed(const PlanThrowOptions& options, const std::optional<datasets::Sku>&
                                  planners::symmetric(*sku->inertia, *sku->inertia, about_its_axis, 0, 0, 0)});
 }
 
-/// `height` of the box [m].
 planners::PlanOptions plan_options(const PlanThrowOptions& options, const Chain& arm, bool planar,
-                                   double height) {
+                                   const Eigen::Vector3d& target) {
   planners::PlanOptions out;
   // The tube's landings come down at no more than so much: half as fast again as from above any arm.
   constexpr double kHighest = 1.5, kMargin = 1.5;  // m, -
-  const double fall = std::sqrt(2 * out.search.medium.gravity * std::max(0.0, kHighest - height));
+  const double fall = std::sqrt(2 * out.search.medium.gravity * std::max(0.0, kHighest - target.z()));
   out.search.landing.z_rate_low = std::min(out.search.landing.z_rate_low, -kMargin * fall);
   out.search.window = options.window;
   out.search.samples = options.samples;
   out.search.threads = options.threads;
   out.refine = !options.plain;
-  if (planar) make_planar(out.search, arm);
   out.home = options.arm == "panda" ? planners::panda_ready() : planners::middle_of(arm);
+  if (!planar) return out;
+  std::string reason;
+  auto held = planners::planar_joints(arm, out.home, target, &reason);
+  if (!held)
+    throw Unanswered(fmt::format(
+        "no_plane: {} cannot throw in the vertical plane of the target: {}; {}", options.arm, reason,
+        options.planar ? "plan it without --planar"
+                       : "a release as a card says is planar: plan it without --card"));
+  out.search.fixed = std::move(*held);
   return out;
 }
 
@@ -343,7 +351,7 @@ void plan_throw(const PlanThrowOptions& options) {
   if (given) answer.lever = given->com_offset;
   const Chain pads = armed(options, given);
   answer.chain = planners::with_tool(pads, {Eigen::Matrix3d::Identity(), {0, 0, object.com_offset.value}});
-  auto how = plan_options(options, pads, options.planar || card.has_value(), answer.box.middle.z());
+  auto how = plan_options(options, pads, options.planar || card.has_value(), answer.box.middle);
   how.search.medium.drag_k = drag_of(answer, options, given);
   how.search.window = answer.window = std::max(options.window, card ? planners::window_for(*card) : 0.0);
   constexpr double kLongestWindow = 1;  // [s]
@@ -424,7 +432,8 @@ Command plan_throw_command(Parser& plan) {
       .range(0.0, 10.0);
   parser.file("--card", o->card, "A model card: the release follows its contact model (planar throws)");
   parser.file("--sku", o->sku, "The object: mass, inertia, drag, offset of its centre of mass from the pads");
-  parser.flag("--planar", o->planar, "Throw in the vertical plane of the target");
+  parser.flag("--planar", o->planar,
+              "Throw in the vertical plane of the target, with the joints whose axes are normal to it");
   parser.flag("--tube-cvx", o->plain, "Stop at the convex problem, without refinement");
   parser.option("--samples", o->samples, "Configurations searched").range(1, 1000000).with_default();
   parser.option("--draws", o->draws, "Landings drawn").range(1, 1000000).with_default();
