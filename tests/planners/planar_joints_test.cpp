@@ -1,6 +1,7 @@
 // Arms that are made planar by holding some of their joints.
 #include "planners/tube/planar_joints.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -154,11 +155,36 @@ TEST(PlanarJoints, AUr5ThrowsAsACardSays) {
   EXPECT_LT(draw_landings(p, 100, 1).std, before.std);
   const Eigen::Vector3d across =
       (box.middle - forward_kinematics(arm, p.start.q).p).cross(Eigen::Vector3d::UnitZ()).normalized();
-  for (double t = 0; t <= p.hold; t += 0.01) {
-    const auto tip = forward_kinematics(arm, robust->motion.at(t).q);
-    EXPECT_NEAR(across.dot(tip.p - box.middle), 0, 1e-6);
-    EXPECT_NEAR(across.dot(tip.R.col(2)), 0, 1e-6);
-  }
+  for (const JointTrajectory* motion : {&tube.plan->motion, &robust->motion})
+    for (double t = 0; t <= p.hold; t += 0.01) {
+      const auto tip = forward_kinematics(arm, motion->at(t).q);
+      EXPECT_NEAR(across.dot(tip.p - box.middle), 0, 1e-6);
+      EXPECT_NEAR(across.dot(tip.R.col(2)), 0, 1e-6);
+    }
+}
+
+// Stretched out in the middle of its ranges it rests with the tool below its base.
+TEST(PlanarJoints, AUr5CannotRestInTheMiddleOfItsRanges) {
+  const TargetBox box{{0.9, 0.3, 0}};
+  PlanOptions options;
+  const auto refused = [&] {
+    const auto result = plan_throw(ur5(), box, options);
+    EXPECT_EQ(result.outcome, PlanOutcome::no_rest);
+    return result.reason;
+  };
+  const double tip = forward_kinematics(ur5(), Pose(Pose::Zero(6))).p.z();
+  ASSERT_LT(tip, 0);
+  EXPECT_THAT(refused(), HasSubstr(fmt::format("at rest at (0, 0, 0, 0, 0, 0) deg the arm's lowest joint or "
+                                               "what it throws is at {:.3f} m",
+                                               tip)));
+  options.home = ur5_bent();
+  options.home[3] = 7;
+  EXPECT_THAT(refused(), HasSubstr("at rest wrist_1 is at 7 rad; accepted: [-6.283, 6.283] rad"));
+  Chain arm = ur5();
+  arm.home = ur5_bent();
+  const auto result = plan_throw(arm, box);
+  ASSERT_TRUE(result.plan) << result.reason;
+  EXPECT_LT((result.plan->motion.at(result.plan->motion.begin).q - arm.home).norm(), 1e-12);
 }
 
 }  // namespace

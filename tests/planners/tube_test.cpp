@@ -423,9 +423,20 @@ TEST(PlanThrow, StaysAboveItsBase) {
   options.home = Joints{{0, 1.5, 0, -1.0, 0, 2.6, 0.785}};
   const Chain arm = thrower();
   ASSERT_LT(forward_kinematics(arm, options.home).p.z(), -0.02);
-  const auto result = plan_throw(arm, boxes()[0], options);
-  EXPECT_EQ(result.outcome, PlanOutcome::no_motion);
-  EXPECT_THAT(result.reason, testing::HasSubstr("the arm would come down to -0."));
+  EXPECT_EQ(plan_throw(arm, boxes()[0], options).outcome, PlanOutcome::no_rest);
+  // Two links that rest level behind their shoulder swing through below it to throw forward.
+  Joint shoulder{"shoulder", modified_dh(0, std::numbers::pi / 2, 0), {}, {-3, 3, 4, 40, 5000}};
+  shoulder.origin.p.z() = 0.3;
+  const Chain links{"links",
+                    {shoulder, {"elbow", modified_dh(0.5, 0, 0), {}, {-2.5, 2.5, 6, 60, 5000}}},
+                    modified_dh(0.4, 0, 0)};
+  options.home = Joints{{-2.95, 0.0}};
+  ASSERT_GT(forward_kinematics(links, options.home).p.z(), 0.05);
+  const auto below = plan_throw(links, {{1.3, 0, -0.2}}, options);
+  EXPECT_EQ(below.outcome, PlanOutcome::no_motion);
+  EXPECT_THAT(below.reason, testing::HasSubstr("the arm would come down to -0."));
+  options.home = Joints{{2.5, 0.0}};
+  EXPECT_EQ(plan_throw(links, {{1.3, 0, -0.2}}, options).outcome, PlanOutcome::planned);
 }
 
 // Braking begins with the acceleration of the window: what that adds to a velocity at its limit is left room
