@@ -173,6 +173,8 @@ PredictedLandings by_release(const std::string& name, const planners::JointTraje
                                    release.target);
   for (const double miss : out.drawn.miss)
     out.hits += a.box.holds(miss * plane.along.x(), miss * plane.along.y());
+  out.across.miss.assign(out.drawn.miss.size(), 0.0);  // the release stays in the plane
+  planners::summarise(out.across);
   return out;
 }
 

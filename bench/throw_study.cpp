@@ -334,7 +334,7 @@ void judge(const ReleaseThrow& thrown, Judged& out) {
     const Landings drawn = draw_landings(thrown, draws, 1, &before);
     ++out.held;
     out.draws += draws;
-    out.square += drawn.mean * drawn.mean + drawn.std * drawn.std;
+    if (drawn.miss.size() > 1) out.square += drawn.mean * drawn.mean + drawn.std * drawn.std;
     out.hits += static_cast<int>(
         std::count_if(drawn.miss.begin(), drawn.miss.end(), [](double x) { return std::abs(x) <= 0.075; }));
     return;

@@ -886,7 +886,10 @@ TEST(ReleaseThrow, SummaryIsOfASample) {
   out.miss = {0.5};
   summarise(out);
   EXPECT_EQ(out.mean, 0.5);
-  EXPECT_EQ(out.std, 0);
+  EXPECT_TRUE(std::isnan(out.std)) << "one has no spread";
+  out.miss.clear();
+  summarise(out);
+  EXPECT_TRUE(std::isnan(out.mean) && std::isnan(out.std));
 }
 
 // Rubber: friction of more than one scatters as any other.
