@@ -163,6 +163,38 @@ TEST(PlanarJoints, AUr5ThrowsAsACardSays) {
     }
 }
 
+// Beside its plane, the axis of its base could help the landing's distance; the throw would leave the plane.
+TEST(PlanarJoints, HeldOnesDoNotAccelerate) {
+  const Chain arm = ur5();
+  const TargetBox box{{0.9, 0.3, 0}};
+  NominalOptions search;
+  search.samples = 600;
+  search.fixed = *planar_joints(arm, ur5_bent(), box.middle);
+  double most = 0;
+  int solved = 0;
+  for (const NominalThrow& one : find_throws(arm, box, search)) {
+    TubeProblem problem{arm, one.state, box.middle};
+    const auto free = solve_tube(problem);
+    problem.held = joints_of(search.fixed);
+    const auto tube = solve_tube(problem);
+    if (free.outcome != TubeOutcome::solved || tube.outcome != TubeOutcome::solved) continue;
+    ++solved;
+    const Pose refined = refine_tube(problem, tube.qdd);
+    for (const int joint : problem.held) {
+      EXPECT_NEAR(tube.qdd[joint], 0, 1e-6);
+      EXPECT_NEAR(refined[joint], 0, 1e-6);
+      most = std::max(most, std::abs(free.qdd[joint]));
+    }
+    EXPECT_LE(largest_miss(landings_over_window(problem, refined, 11)),
+              largest_miss(landings_over_window(problem, tube.qdd, 11)) + 1e-3);
+  }
+  EXPECT_GT(solved, 5);
+  EXPECT_GT(most, 1e-3) << "if they are asked";
+  TubeProblem wrong{arm, {Pose::Zero(6), Pose::Zero(6)}, box.middle};
+  wrong.held = {6};
+  EXPECT_THROW(solve_tube(wrong), std::invalid_argument);
+}
+
 // Stretched out in the middle of its ranges it rests with the tool below its base.
 TEST(PlanarJoints, AUr5CannotRestInTheMiddleOfItsRanges) {
   const TargetBox box{{0.9, 0.3, 0}};
