@@ -41,8 +41,8 @@ enum class PlanOutcome {
   planned,    ///< a plan was found
   no_throw,   ///< no configuration reaches the box within the limits
   no_tube,    ///< none of the throws has a tube acceleration that lands in the box from the whole window
-  no_rest,    ///< the arm cannot rest where it is to begin
   no_motion,  ///< no motion to any of them stays within the limits, or they are refused
+  no_rest,    ///< the arm cannot rest where it is to begin
 };
 /// The outcome's name, as it is written above.
 const char* to_string(PlanOutcome);
