@@ -230,7 +230,7 @@ void targets(int count) {
   std::mt19937_64 random(1);
   std::uniform_real_distribution<double> reach(0.9, 1.5), azimuth(-1.0, 1.0), height(-0.4, 0.3);
   Times tube, plan, refine;
-  int planned = 0, outside = 0, outcomes[4]{};
+  int planned = 0, outside = 0, outcomes[5]{};
   LimitCheck most;
   Times tube_miss, miss;
   for (int i = 0; i < count; ++i) {
