@@ -1,5 +1,6 @@
 // unhand plan elastic: throws of an arm whose last joint is a spring behind clutches.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -148,13 +149,18 @@ std::string resimulated(const el::Replay& run) {
   return run.spring_stop ? "spring at its stop" : fmt::format("{:.3f}", speed_of(run.release));
 }
 
-/// The fastest throw of each drive.
-ElasticAnswer fastest(const el::ClutchedArm& arm, const PlanElasticOptions& o, Json json) {
+/// The fastest throw of each drive, and the drives of which no throw is confirmed by its run.
+struct FastestAnswer {
+  ElasticAnswer answer;
+  std::vector<std::string> without;
+};
+FastestAnswer fastest(const el::ClutchedArm& arm, const PlanElasticOptions& o, Json json) {
   el::ThrowTask task;
   task.longest = o.longest > 0 ? o.longest : 0.6;
   task.elevation = o.elevation * M_PI / 180;
   std::vector<Fastest> all;
-  ElasticAnswer out;
+  FastestAnswer found;
+  ElasticAnswer& out = found.answer;
   out.table = {{"drive", "basin", "starts", "tip speed [m/s]", "re-simulated", "duration [s]", "limits used",
                 "intervals"},
                {},
@@ -181,13 +187,16 @@ ElasticAnswer fastest(const el::ClutchedArm& arm, const PlanElasticOptions& o, J
       j["basins"].push_back(basin_json(confirmed.found[k]));
       out.trajectories += trajectory_rows(fmt::format("{},{}", name, k + 1), arm, best.run);
     }
+    if (std::none_of(confirmed.found.begin(), confirmed.found.end(),
+                     [](const el::ConfirmedBasin& basin) { return basin.best.confirmed; }))
+      found.without.push_back(confirmed.found.empty() ? name + " (none was found)" : name);
   }
   json["longest_solve_s"] = longest;
   out.notes = fmt::format("longest solve {:.2f} s of CPU time, {} random starts each\n", longest, o.starts) +
               (o.arm == PlanElasticOptions().arm ? kOnHardware : "");
   out.figures = speed_figures(arm, all);
   out.json = std::move(json);
-  return out;
+  return found;
 }
 
 /// Why there is no table: the target without a throw, and to which there are some.
@@ -313,13 +322,20 @@ void run(const PlanElasticOptions& o, const Parser& parser) {
   const auto give_all = [&](const ElasticAnswer& answer) {
     give(answer, "plan elastic", o.arm, o.json, o.report);
   };
-  if (!(o.target_x > 0)) return give_all(fastest(arm, o, std::move(json)));
+  constexpr const char* kRemedy = "more --intervals, or a shorter --longest, may confirm some";
+  if (!(o.target_x > 0)) {
+    const FastestAnswer found = fastest(arm, o, std::move(json));
+    give_all(found.answer);
+    if (!found.without.empty())
+      throw Unanswered(fmt::format("no throw of {} is confirmed by its run: none of these is to be made; {}",
+                                   fmt::join(found.without, ", "), kRemedy));
+    return;
+  }
   const TargetAnswer found = to_target(arm, o, std::move(json));
   give_all(found.answer);
   if (found.missed == found.nodes)
-    throw Unanswered(
-        "no node of the table is confirmed by its run: none of these throws is to be made; more --intervals, "
-        "or a shorter --longest, may confirm some");
+    throw Unanswered(fmt::format(
+        "no node of the table is confirmed by its run: none of these throws is to be made; {}", kRemedy));
 }
 
 }  // namespace
@@ -329,7 +345,9 @@ Command plan_elastic_command(Parser& plan) {
   Parser& parser = plan.subcommand(
       "elastic",
       "Optimal throws of an arm with a clutched spring: the fastest, or a table of throws to targets");
-  parser.footer("Example: unhand plan elastic --target 2.2 --report out/elastic");
+  parser.footer(
+      "Exit code 1: no throw of a drive, or of the table, is confirmed by its run.\n"
+      "Example: unhand plan elastic --target 2.2 --report out/elastic");
   parser.option("--arm", o->arm, "bsa3, or a TOML file: an arm with a clutched last joint").with_default();
   parser
       .option("--target", o->target_x,

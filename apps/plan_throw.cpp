@@ -9,6 +9,7 @@
 #include <array>
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <random>
 #include <tuple>
 
@@ -28,6 +29,7 @@
 #include "planners/arm/chain_file.hpp"
 #include "planners/arm/panda.hpp"
 #include "planners/tube/planar_hand.hpp"
+#include "planners/tube/planar_joints.hpp"
 #include "planners/tube/robust_throw.hpp"
 
 namespace unhand::apps {
@@ -40,7 +42,7 @@ using planners::JointVector;
 constexpr double kGripperMass = 0.65, kLoadedGripperMass = 0.9;
 
 struct PlanThrowOptions {
-  std::string arm{"panda"}, tip, target, box{"0.15x0.15"}, card, sku, json, report;
+  std::string arm{"panda"}, tip, home, target, box{"0.15x0.15"}, card, sku, json, report;
   double acceleration{0}, jerk{0};     // 0: the file gives them
   std::optional<double> gripper_mass;  // nothing: kGripperMass or kLoadedGripperMass
   std::optional<double> drag;          // nothing: the SKU tells it, else 0
@@ -66,6 +68,31 @@ void fill_limits(Chain& arm, const PlanThrowOptions& options) {
     }
 }
 
+/// Where the arm rests before the throw [rad], and who told it.
+struct RestPose {
+  JointVector<double> q;
+  std::string from;
+};
+RestPose rest_pose_of(const PlanThrowOptions& options, const Chain& arm) {
+  if (options.home.empty()) {
+    if (options.arm == "panda") return {planners::panda_ready(), "its ready pose"};
+    return {planners::rest_pose(arm),
+            arm.home.size() > 0 ? "home_rad of its file" : "the middle of its joints' ranges"};
+  }
+  const auto degrees = numbers("--home", options.home, ',', arm.joints.size());
+  RestPose out{JointVector<double>(arm.size()), "--home"};
+  for (int i = 0; i < arm.size(); ++i) {
+    const auto& [name, origin, link, limits, friction] = arm.joints[static_cast<std::size_t>(i)];
+    constexpr double kDegree = std::numbers::pi / 180;
+    out.q[i] = degrees[static_cast<std::size_t>(i)] * kDegree;
+    if (!(out.q[i] >= limits.lower && out.q[i] <= limits.upper))
+      throw WrongUsage(fmt::format("--home: {:g} deg of joint '{}' is not in [{:.4g}, {:.4g}] deg",
+                                   degrees[static_cast<std::size_t>(i)], name, limits.lower / kDegree,
+                                   limits.upper / kDegree));
+  }
+  return out;
+}
+
 /// The arm with its gripper and, where an SKU tells of it, the object in it.
 Chain armed(const PlanThrowOptions& options, const std::optional<datasets::Sku>& sku) {
   Chain arm;
@@ -86,20 +113,28 @@ Chain armed(const PlanThrowOptions& options, const std::optional<datasets::Sku>&
                                  planners::symmetric(*sku->inertia, *sku->inertia, about_its_axis, 0, 0, 0)});
 }
 
-/// `height` of the box [m].
-planners::PlanOptions plan_options(const PlanThrowOptions& options, const Chain& arm, bool planar,
-                                   double height) {
+planners::PlanOptions plan_options(const PlanThrowOptions& options, const Chain& arm,
+                                   const JointVector<double>& home, bool planar,
+                                   const Eigen::Vector3d& target) {
   planners::PlanOptions out;
   // The tube's landings come down at no more than so much: half as fast again as from above any arm.
   constexpr double kHighest = 1.5, kMargin = 1.5;  // m, -
-  const double fall = std::sqrt(2 * out.search.medium.gravity * std::max(0.0, kHighest - height));
+  const double fall = std::sqrt(2 * out.search.medium.gravity * std::max(0.0, kHighest - target.z()));
   out.search.landing.z_rate_low = std::min(out.search.landing.z_rate_low, -kMargin * fall);
   out.search.window = options.window;
   out.search.samples = options.samples;
   out.search.threads = options.threads;
   out.refine = !options.plain;
-  if (planar) make_planar(out.search, arm);
-  out.home = options.arm == "panda" ? planners::panda_ready() : planners::middle_of(arm);
+  out.home = home;
+  if (!planar) return out;
+  std::string reason;
+  auto held = planners::planar_joints(arm, out.home, target, &reason);
+  if (!held)
+    throw Unanswered(fmt::format(
+        "no_plane: {} cannot throw in the vertical plane of the target: {}; {}", options.arm, reason,
+        options.planar ? "plan it without --planar"
+                       : "a release as a card says is planar: plan it without --card"));
+  out.search.fixed = std::move(*held);
   return out;
 }
 
@@ -139,6 +174,8 @@ PredictedLandings by_release(const std::string& name, const planners::JointTraje
                                    release.target);
   for (const double miss : out.drawn.miss)
     out.hits += a.box.holds(miss * plane.along.x(), miss * plane.along.y());
+  out.across.miss.assign(out.drawn.miss.size(), 0.0);  // the release stays in the plane
+  planners::summarise(out.across);
   return out;
 }
 
@@ -344,7 +381,8 @@ void plan_throw(const PlanThrowOptions& options) {
   if (given) answer.lever = given->com_offset;
   const Chain pads = armed(options, given);
   answer.chain = planners::with_tool(pads, {Eigen::Matrix3d::Identity(), {0, 0, object.com_offset.value}});
-  auto how = plan_options(options, pads, options.planar || card.has_value(), answer.box.middle.z());
+  const RestPose rest = rest_pose_of(options, pads);
+  auto how = plan_options(options, pads, rest.q, options.planar || card.has_value(), answer.box.middle);
   how.search.medium.drag_k = drag_of(answer, options, given);
   how.search.window = answer.window = std::max(options.window, card ? planners::window_for(*card) : 0.0);
   constexpr double kLongestWindow = 1;  // [s]
@@ -368,6 +406,9 @@ void plan_throw(const PlanThrowOptions& options) {
     };
   std::optional<Progress> progress(std::in_place, "plan throw", 0);
   auto result = planners::plan_throw(answer.chain, answer.box, how);
+  if (result.outcome == planners::PlanOutcome::no_rest)
+    throw Unanswered(fmt::format("{}: {} (this pose is {}; --home gives another)", to_string(result.outcome),
+                                 result.reason, rest.from));
   if (!result.plan)
     throw Unanswered(fmt::format("{}: {}", to_string(result.outcome),
                                  dropping.count > 0 ? dropping.in_words(*card) : result.reason));
@@ -407,6 +448,10 @@ Command plan_throw_command(Parser& plan) {
   parser.option("--box", o->box, "Opening of the box along x and y, AxB [m]").with_default();
   parser.option("--arm", o->arm, "panda, a TOML chain or a URDF file").with_default();
   parser.option("--tip", o->tip, "Of a URDF file: the link that carries the gripper, if several links end");
+  parser.option(
+      "--home", o->home,
+      "Rest pose before the throw, one angle for each joint, A,B,... [deg]; else home_rad of a TOML "
+      "file, the Panda's ready pose, or the middle of the joints' ranges");
   parser.option("--acceleration", o->acceleration, "Limit of joints that the arm's file gives none [rad/s2]")
       .range(1e-3, 1e6);
   parser.option("--jerk", o->jerk, "The same of the jerk [rad/s3]").range(1e-3, 1e9);
@@ -425,7 +470,8 @@ Command plan_throw_command(Parser& plan) {
       .range(0.0, 10.0);
   parser.file("--card", o->card, "A model card: the release follows its contact model (planar throws)");
   parser.file("--sku", o->sku, "The object: mass, inertia, drag, offset of its centre of mass from the pads");
-  parser.flag("--planar", o->planar, "Throw in the vertical plane of the target");
+  parser.flag("--planar", o->planar,
+              "Throw in the vertical plane of the target, with the joints whose axes are normal to it");
   parser.flag("--tube-cvx", o->plain, "Stop at the convex problem, without refinement");
   parser.option("--samples", o->samples, "Configurations searched").range(1, 1000000).with_default();
   parser.option("--draws", o->draws, "Landings drawn").range(1, 1000000).with_default();

@@ -14,12 +14,11 @@ namespace unhand::apps {
 
 /// Landings of the same draws under one motion, from the target.
 struct PredictedLandings {
-  std::string name;          ///< "planned", "no acceleration", …
-  planners::Landings drawn;  ///< forward [m]
-  int hits{};                ///< within the box, of all draws
-  /// Across [m], of the same draws; none where the throw stays in the vertical plane of its target.
-  planners::Landings across{};
-  double rms() const;  ///< of the distance from the target [m]
+  std::string name;             ///< "planned", "no acceleration", …
+  planners::Landings drawn;     ///< forward [m]
+  int hits{};                   ///< within the box, of all draws
+  planners::Landings across{};  ///< the same draws, across [m]
+  double rms() const;           ///< of the distance from the target [m]; NaN where none lands
 };
 
 struct ThrowAnswer {

@@ -66,9 +66,16 @@ std::string percent(int part, std::size_t all) {
   return fmt::format("{:.1f} %", 100.0 * part / std::max(1.0, static_cast<double>(all)));
 }
 
+/// A length, or that there is none.
+std::string metres(double x, bool sign = false) {
+  if (!std::isfinite(x)) return "-";
+  return sign ? with_sign(x, 4) : fmt::format("{:.4f}", x);
+}
+
 }  // namespace
 
 double PredictedLandings::rms() const {
+  if (drawn.miss.size() == 1) return std::hypot(drawn.mean, across.mean);
   const double along = std::hypot(drawn.mean, drawn.std), beside = std::hypot(across.mean, across.std);
   return std::hypot(along, beside);
 }
@@ -102,9 +109,8 @@ std::string text_of(const ThrowAnswer& a, bool markdown) {
     landings.rows.push_back(
         {one.name, fmt::to_string(one.drawn.miss.size()),
          percent(one.hits, one.drawn.miss.size() + static_cast<std::size_t>(one.drawn.lost)),
-         with_sign(one.drawn.mean, 4), fmt::format("{:.4f}", one.drawn.std), with_sign(one.across.mean, 4),
-         fmt::format("{:.4f}", one.across.std), fmt::format("{:.4f}", one.rms()),
-         fmt::to_string(one.drawn.lost)});
+         metres(one.drawn.mean, true), metres(one.drawn.std), metres(one.across.mean, true),
+         metres(one.across.std), metres(one.rms()), fmt::to_string(one.drawn.lost)});
   out += shown(landings);
   if (!plan.landings.empty())
     out += fmt::format("\nlargest miss of any release in the window: {:.4f} m\n",
@@ -173,10 +179,14 @@ Json throw_json(const ThrowAnswer& a) {
   out["motion"] = a.predicted.empty() ? Json(nullptr) : Json(a.predicted.front().name);
   out["predicted"] = Json::object();
   for (const auto& one : a.predicted)
-    out["predicted"][one.name] = {
-        {"landed", one.drawn.miss.size()}, {"lost", one.drawn.lost}, {"hits", one.hits},
-        {"mean_m", one.drawn.mean},        {"std_m", one.drawn.std}, {"mean_across_m", one.across.mean},
-        {"std_across_m", one.across.std},  {"rms_m", one.rms()}};
+    out["predicted"][one.name] = {{"landed", one.drawn.miss.size()},
+                                  {"lost", one.drawn.lost},
+                                  {"hits", one.hits},
+                                  {"mean_m", number(one.drawn.mean)},
+                                  {"std_m", number(one.drawn.std)},
+                                  {"mean_across_m", number(one.across.mean)},
+                                  {"std_across_m", number(one.across.std)},
+                                  {"rms_m", number(one.rms())}};
   out["release"] = nullptr;
   Json numbers = Json::object();
   for (const auto& one : a.numbers)
@@ -238,8 +248,7 @@ std::string landings_csv(const ThrowAnswer& a) {
   std::string out = "motion,forward_m,across_m\n";
   for (const auto& one : a.predicted)
     for (std::size_t i = 0; i < one.drawn.miss.size(); ++i)
-      out += fmt::format("{},{:.6g},{:.6g}\n", one.name, one.drawn.miss[i],
-                         one.across.miss.empty() ? 0.0 : one.across.miss[i]);
+      out += fmt::format("{},{:.6g},{:.6g}\n", one.name, one.drawn.miss[i], one.across.miss[i]);
   return out;
 }
 
@@ -306,8 +315,7 @@ Figure tube_figure(const ThrowAnswer& a) {
                           {}});
     }
   std::string predicted;
-  if (a.with_release && !a.predicted.front().drawn.miss.empty()) {
-    const auto& drawn = a.predicted.front().drawn;
+  if (const auto& drawn = a.predicted.front().drawn; a.with_release && drawn.miss.size() > 1) {
     out.data.push_back({"landings that the card predicts",
                         {"mean forward [m]", "height [m]", "standard deviation [m]"},
                         {{drawn.mean, 0, drawn.std}},
@@ -407,7 +415,7 @@ Figure planned_landing_figure(const ThrowAnswer& a) {
         fmt::format("with linespoints pointtype 6 pointinterval 4 linecolor rgb '{}' dashtype 2", quiet)};
     out.script = "set multiplot\nset key off\nset grid linecolor rgb '#dddddd'\n";
     for (const bool forward : {true, false}) {
-      out.script += place(out, forward ? Panel{1.9, 8.3, 2.7, 8.4} : Panel{10.3, 16.7, 2.7, 8.4});
+      out.script += place(out, forward ? Panel{1.9, 8.2, 2.7, 8.4} : Panel{10.2, 16.5, 2.7, 8.4});
       out.script += fmt::format(
           "set xlabel 'release after the command [ms]' offset 0,0.3; set ylabel 'landing, {0} the middle "
           "[cm]'\nplot {1:.3g} with lines linecolor rgb 'black', {2:.3g} with lines linecolor rgb 'black'",
@@ -421,7 +429,7 @@ Figure planned_landing_figure(const ThrowAnswer& a) {
                              {styles[2], "no acceleration"},
                              {styles[1], "Tube-CVX"},
                              {styles[0], "planned"}},
-                            4) +
+                            2) +
                   "unset multiplot\n";
     return out;
   }

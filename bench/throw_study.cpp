@@ -9,7 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <numbers>
+#include <optional>
 #include <random>
 #include <string>
 #include <string_view>
@@ -23,6 +23,7 @@
 #include "planners/tube/insensitive_throw.hpp"
 #include "planners/tube/plan_throw.hpp"
 #include "planners/tube/planar_hand.hpp"
+#include "planners/tube/planar_joints.hpp"
 
 namespace {
 
@@ -43,14 +44,11 @@ Chain pads() {
       with_payload(panda(), {0.9, {0, 0, 0.075}, symmetric(2.4e-3, 2.4e-3, 1.5e-3, 0, 0, 0)});
   return with_tool(loaded, {Eigen::Matrix3d::Identity(), {0, 0, 0.15}});
 }
-PlanOptions options(bool planar) {
-  constexpr double pi = std::numbers::pi;
+/// `in_plane_of`: a target in whose vertical plane the throw stays.
+PlanOptions options(const std::optional<Eigen::Vector3d>& in_plane_of = {}) {
   PlanOptions out;
-  out.home = Joints{{0, -pi / 4, 0, -3 * pi / 4, 0, pi / 2, pi / 4}};
-  if (planar) {
-    out.search.fixed = {{2, 0.0}, {4, 0.0}, {6, pi / 4}};
-    out.search.face_target = true;
-  }
+  out.home = panda_ready();
+  if (in_plane_of) out.search.fixed = *planar_joints(pads(), out.home, *in_plane_of);
   return out;
 }
 
@@ -79,6 +77,8 @@ const Configuration configurations[]{{"planar", {1.3, 0, -0.2}, true, 0, {97.3, 
                                      {"(b)", {1.1, 0, 0}, false, 1, {40.7, 1, 88.5, 4.1}},
                                      {"(c)", {1.3, 0, -0.3}, false, 0, {81.4, 25.5, 95.6, 90.4}},
                                      {"(d)", {0, -0.7, 0.7}, false, 0, {63.7, 27.6, 96.0, 96.5}}};
+
+PlanOptions options_of(const Configuration& c) { return c.planar ? options(c.box) : options(); }
 
 struct Score {
   double small{}, large{};  ///< share in the boxes of 15 x 15 and 37 x 33 cm [%]
@@ -130,7 +130,7 @@ void all_throws(const Chain& arm) {
     if (c.which == 1) continue;
     const TargetBox box{c.box, 0.15, 0.15};
     double best = HUGE_VAL;
-    const auto offered = find_throws(arm, box, options(c.planar).search);
+    const auto offered = find_throws(arm, box, options_of(c).search);
     for (const auto& one : offered)
       best = std::min(best, score({arm, one.state, c.box, 0.1}, Joints::Zero(7), 0, 1).std);
     least += fmt::format("{}{} {:.2f} cm", least.empty() ? "" : ", ", c.name, 100 * best);
@@ -183,7 +183,7 @@ void boxes() {
       }());
   double sums[3]{};
   for (const auto& c : configurations) {
-    const PlanOptions how = options(c.planar);
+    const PlanOptions how = options_of(c);
     const TargetBox box{c.box, 0.15, 0.15};
     NominalOptions search = how.search;
     auto result = plan_throw(arm, box, how);
@@ -230,14 +230,14 @@ void targets(int count) {
   std::mt19937_64 random(1);
   std::uniform_real_distribution<double> reach(0.9, 1.5), azimuth(-1.0, 1.0), height(-0.4, 0.3);
   Times tube, plan, refine;
-  int planned = 0, outside = 0, outcomes[4]{};
+  int planned = 0, outside = 0, outcomes[5]{};
   LimitCheck most;
   Times tube_miss, miss;
   for (int i = 0; i < count; ++i) {
     const double r = reach(random), a = azimuth(random);
     const TargetBox box{{r * std::cos(a), r * std::sin(a), height(random)}, 0.15, 0.15};
     const double begin = cpu_seconds();
-    const auto result = plan_throw(arm, box, options(false));
+    const auto result = plan_throw(arm, box, options());
     plan.values.push_back(cpu_seconds() - begin);
     ++outcomes[static_cast<int>(result.outcome)];
     if (!result.plan) continue;
@@ -321,7 +321,7 @@ struct Judged {
 /// Counts a throw if, of a few motions to it within the limits, there is one over which the grip holds.
 void judge(const ReleaseThrow& thrown, Judged& out) {
   constexpr int draws = 200;
-  const Joints home = options(true).home;
+  const Joints home = panda_ready();
   bool possible = false;
   for (const double share : {0.9, 0.65, 0.45, 0.3}) {
     const auto motion = throw_motion(thrown.chain, home, thrown.start, thrown.qdd, thrown.hold, share);
@@ -334,7 +334,7 @@ void judge(const ReleaseThrow& thrown, Judged& out) {
     const Landings drawn = draw_landings(thrown, draws, 1, &before);
     ++out.held;
     out.draws += draws;
-    out.square += drawn.mean * drawn.mean + drawn.std * drawn.std;
+    if (drawn.miss.size() > 1) out.square += drawn.mean * drawn.mean + drawn.std * drawn.std;
     out.hits += static_cast<int>(
         std::count_if(drawn.miss.begin(), drawn.miss.end(), [](double x) { return std::abs(x) <= 0.075; }));
     return;
@@ -353,7 +353,7 @@ void grasps() {
   for (const double offset : {0.0, 0.14})
     for (const double grip : {80.0, 40.0, 20.0, 10.0}) {
       const Chain com = with_tool(arm, {Eigen::Matrix3d::Identity(), {0, 0, offset}});
-      NominalOptions search = options(true).search;
+      NominalOptions search = options(target).search;
       search.window = 0.12;
       search.refined = 0;
       search.candidates = 400;

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "planners/arm/panda.hpp"
+#include "planners/tube/planar_joints.hpp"
 #include "planners/tube/robust_throw.hpp"
 
 using namespace unhand::planners;
@@ -24,8 +25,10 @@ int main() {
 
   // A throw in the vertical plane of the target, along states that all land there.
   PlanOptions options;
-  make_planar(options.search, arm);
   options.home = panda_ready();
+  const auto held = planar_joints(arm, options.home, box.middle);
+  if (!held) return 1;
+  options.search.fixed = *held;
   options.search.window = std::fmax(0.1, window_for(card));
   const Chain to_bar = with_tool(arm, {Eigen::Matrix3d::Identity(), {0, 0, bar.com_offset.value}});
   const auto tube = plan_throw(to_bar, box, options);

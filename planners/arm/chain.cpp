@@ -80,6 +80,15 @@ void validate(const Chain& chain) {
     for (const double phi : {joint.friction.phi1, joint.friction.phi2, joint.friction.phi3})
       if (!std::isfinite(phi)) wrong("its friction is not finite");
   }
+  if (chain.home.size() == 0) return;
+  if (chain.home.size() != chain.size())
+    fail(fmt::format("its home has {} values for {} joints", chain.home.size(), chain.size()));
+  for (int i = 0; i < chain.size(); ++i) {
+    const auto& [name, origin, link, limits, friction] = chain.joints[i];
+    if (!(chain.home[i] >= limits.lower && chain.home[i] <= limits.upper))
+      fail(fmt::format("home of joint '{}': {} is not in [{}, {}] rad", name, chain.home[i], limits.lower,
+                       limits.upper));
+  }
 }
 
 Chain with_tool(Chain chain, const Transform<double>& tool) {

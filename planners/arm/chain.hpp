@@ -99,13 +99,14 @@ struct Chain {
   std::vector<Joint> joints;         ///< from the base outwards
   Transform<double> tip;             ///< in the last link's frame: the flange, or the tool on it
   std::vector<std::string> notes{};  ///< what a file says that the chain leaves out
+  JointVector<double> home{};        ///< where it rests [rad]; empty: not told
 
   /// How many joints there are.
   int size() const { return static_cast<int>(joints.size()); }
 };
 
 /// Throws std::invalid_argument, naming joint, value and accepted range: 1 to 8 joints, rotations that are
-/// ones, masses >= 0 with feasible inertias, limits > 0 with lower < upper.
+/// ones, masses >= 0 with feasible inertias, limits > 0 with lower < upper, a home within them.
 void validate(const Chain& chain);
 
 /// The chain with its tip moved on to `tool`, seen from the tip that it had.

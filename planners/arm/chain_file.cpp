@@ -71,6 +71,9 @@ Chain chain_of(TomlKeys keys) {
     out.tip = frame_of(*tip);
     tip->reject_unknown();
   }
+  std::vector<double> home(out.joints.size());
+  if (keys.numbers("home_rad", angle_limits, home))
+    out.home = JointVector<double>::Map(home.data(), static_cast<Eigen::Index>(home.size()));
   keys.reject_unknown();
   try {
     validate(out);

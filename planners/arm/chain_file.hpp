@@ -12,6 +12,7 @@ namespace unhand::planners {
 /// A chain in TOML, with modified Denavit-Hartenberg parameters:
 ///
 ///   name = "shoulder and elbow"
+///   home_rad = [0.5, 1.2]     # optional: where it rests, an angle for each joint
 ///   [[joint]]
 ///   name = "shoulder"
 ///   a_m = 0.0                 # with alpha_deg and d_m: modified_dh; theta_deg, if any, is where q = 0

@@ -205,9 +205,7 @@ LimitCheck check_limits(const Chain& chain, const JointTrajectory& trajectory, d
           out.torque_rate = {rate, i, t};
     }
     before = torque;
-    const auto frames = frames_of(chain, s.q);
-    out.lowest = std::min(out.lowest, frames.tip.p.z());
-    for (int i = 2; i < chain.size(); ++i) out.lowest = std::min(out.lowest, frames.links[i].p.z());
+    out.lowest = std::min(out.lowest, lowest_height(chain, frames_of(chain, s.q)));
   }
   return out;
 }

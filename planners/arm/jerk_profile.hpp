@@ -86,7 +86,7 @@ struct TorqueRate {
 struct LimitCheck {
   LimitUse position, velocity, acceleration, jerk, torque;  ///< the largest of each
   TorqueRate torque_rate;  ///< for information: motions are not limited by it
-  double lowest{};         ///< height of the lowest joint origin beyond the second, or the tip [m]
+  double lowest{};         ///< as lowest_height [m]
   /// Whether every fraction is at most 1 + tolerance.
   bool within(double tolerance = 1e-9) const;
   /// The limit that is used most, in words. Throws std::invalid_argument for a joint that the chain does not

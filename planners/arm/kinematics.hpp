@@ -63,6 +63,9 @@ Transform<S> forward_kinematics(const Chain& chain, const JointVector<S>& q) {
   return frames_of(chain, q).tip;
 }
 
+/// Height of the lowest joint origin beyond the second, or of the tip [m].
+double lowest_height(const Chain& chain, const ChainFrames<double>& frames);
+
 /// Geometric Jacobian of the tip, (v, ω) = J(q) q̇: column i is (z_i × (p − o_i), z_i).
 template <class S>
 Jacobian<S> jacobian(const Chain& chain, const JointVector<S>& q);

@@ -52,7 +52,6 @@ class Search {
   Search(const Chain& chain, const TargetBox& box, const NominalOptions& options)
       : chain_(chain), box_(box), options_(options) {
     for (const auto& fixed : options.fixed) held_[fixed.joint] = true;
-    if (options.face_target) held_[0] = true;
   }
 
   /// The best throw from a configuration, if there is one.
@@ -233,21 +232,13 @@ void check(const Chain& chain, const TargetBox& box, const NominalOptions& optio
 
 }  // namespace
 
-void make_planar(NominalOptions& options, const Chain& chain) {
-  validate(chain);
-  if (chain.size() == 7) options.fixed = {{2, 0.0}, {4, 0.0}, {6, std::numbers::pi / 4}};
-  options.face_target = std::abs(chain.joints.front().origin.R(2, 2)) > 0.999;
-}
-
 std::vector<NominalThrow> find_throws(const Chain& chain, const TargetBox& box,
                                       const NominalOptions& options) {
   check(chain, box, options);
   const int n = chain.size();
   const Search search(chain, box, options);
-  const double azimuth = std::atan2(box.middle.y(), box.middle.x());
   const auto hold = [&](JointVector<double>& q) {
     for (const auto& fixed : options.fixed) q[fixed.joint] = fixed.angle;
-    if (options.face_target) q[0] = within(chain.joints[0].limits, azimuth);
   };
   const EvenPoints points(n);
   std::vector<std::optional<NominalThrow>> at(static_cast<std::size_t>(options.samples));

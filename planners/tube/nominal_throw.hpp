@@ -36,21 +36,14 @@ struct NominalOptions {
   /// No flight through the arm's column: within kColumn of the base's z axis, and lower than the highest
   /// joint that is as near.
   bool clear_column{true};
-  /// The arm as a planar one: joints named here stay at the given angle, and the first turns to the target.
+  /// A joint that stays at an angle.
   struct Fixed {
     int joint;     ///< index
     double angle;  ///< rad
   };
-  std::vector<Fixed> fixed;  ///< joints that do not move
-  bool face_target{false};   ///< whether the first joint turns to the target
+  std::vector<Fixed> fixed;  ///< the other joints move; planar_joints: in the vertical plane of the target
   int threads{0};            ///< 0: one per core; the answer does not depend on it
 };
-
-/// Asks for throws in the vertical plane of the target, for arms built like the Panda: of seven joints the
-/// third and fifth stay at 0 and the last at 45°, so that the others move in a plane; of any arm whose first
-/// joint stands upright, that turns the plane to the target. An arm that is planar by itself is left as it
-/// is.
-void make_planar(NominalOptions& options, const Chain& chain);
 
 /// Throws std::invalid_argument, naming value and accepted range: numbers finite and in range, joints of the
 /// chain, each fixed once.

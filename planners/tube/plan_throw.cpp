@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -20,6 +21,8 @@ const char* to_string(PlanOutcome outcome) {
       return "no_throw";
     case PlanOutcome::no_tube:
       return "no_tube";
+    case PlanOutcome::no_rest:
+      return "no_rest";
     case PlanOutcome::no_motion:
       return "no_motion";
   }
@@ -119,6 +122,10 @@ JointVector<double> middle_of(const Chain& chain) {
   return out;
 }
 
+JointVector<double> rest_pose(const Chain& chain) {
+  return chain.home.size() > 0 ? chain.home : middle_of(chain);
+}
+
 double largest_miss(const std::vector<LandingAt>& landings) {
   double worst = 0;
   for (const LandingAt& one : landings)
@@ -171,7 +178,8 @@ struct Trial {
 /// `allowed`: the chain with what the window's end may have of its limits.
 Trial try_throw(const Chain& chain, const Chain& allowed, const NominalThrow& nominal, const TargetBox& box,
                 const JointVector<double>& home, const PlanOptions& options) {
-  const TubeProblem problem{allowed, nominal.state, box.middle, options.search.window, options.search.medium};
+  TubeProblem problem{allowed, nominal.state, box.middle, options.search.window, options.search.medium};
+  for (const auto& fixed : options.search.fixed) problem.held.push_back(fixed.joint);
   Trial out{PlanOutcome::no_tube, {}, {}};
   ThrowPlan& plan = out.plan;
   plan.nominal = nominal;
@@ -194,6 +202,25 @@ Trial try_throw(const Chain& chain, const Chain& allowed, const NominalThrow& no
   out.outcome =
       add_motion(chain, home, options, plan, out.reason) ? PlanOutcome::planned : PlanOutcome::no_motion;
   return out;
+}
+
+/// Why the arm cannot rest there; empty: it can.
+std::string why_no_rest(const Chain& chain, const JointVector<double>& home) {
+  std::string pose;
+  for (int i = 0; i < chain.size(); ++i) {
+    const auto& [name, origin, link, limits, friction] = chain.joints[i];
+    if (!(home[i] >= limits.lower && home[i] <= limits.upper))
+      return fmt::format("at rest {} is at {:.4g} rad; accepted: [{:.4g}, {:.4g}] rad", name, home[i],
+                         limits.lower, limits.upper);
+    pose += fmt::format("{}{:.3g}", i > 0 ? ", " : "", home[i] * 180 / std::numbers::pi);
+  }
+  const double lowest = lowest_height(chain, frames_of(chain, home));
+  if (lowest > 0) return "";
+  return fmt::format(
+      "at rest at ({}) deg the arm's lowest joint or what it throws is at {:.3f} m; accepted: above its "
+      "base, "
+      "> 0 m",
+      pose, lowest);
 }
 
 /// Why the search found nothing: by what it finds without one demand or another.
@@ -223,8 +250,13 @@ std::string why_no_throw(const Chain& chain, const TargetBox& box, NominalOption
 PlanResult plan_throw(const Chain& chain, const TargetBox& box, const PlanOptions& options) {
   PlanResult out;
   JointVector<double> home = options.home;
-  if (home.size() == 0) home = middle_of(chain);
+  if (home.size() == 0) home = rest_pose(chain);
   require_joints(chain, "plan", "home", home);
+  if (auto why = why_no_rest(chain, home); !why.empty()) {
+    out.outcome = PlanOutcome::no_rest;
+    out.reason = std::move(why);
+    return out;
+  }
   const auto throws = find_throws(chain, box, options.search);
   out.throws = static_cast<int>(throws.size());
   out.outcome = PlanOutcome::no_throw;

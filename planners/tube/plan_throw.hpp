@@ -29,7 +29,7 @@ inline constexpr int kLandingSamples = 21;
 /// What a whole throw may be.
 struct PlanOptions {
   NominalOptions search;     ///< window and medium are those of all parts
-  JointVector<double> home;  ///< where the arm rests before; empty: middle_of
+  JointVector<double> home;  ///< where the arm rests before [rad]; empty: rest_pose
   bool refine{true};         ///< go on from Tube-CVX to refine_tube
   /// Why a plan within the limits is not taken, as that the grip does not hold its object (why_not_held);
   /// empty: it is taken. Without one all are.
@@ -42,6 +42,7 @@ enum class PlanOutcome {
   no_throw,   ///< no configuration reaches the box within the limits
   no_tube,    ///< none of the throws has a tube acceleration that lands in the box from the whole window
   no_motion,  ///< no motion to any of them stays within the limits, or they are refused
+  no_rest,    ///< the arm cannot rest where it is to begin
 };
 /// The outcome's name, as it is written above.
 const char* to_string(PlanOutcome);
@@ -59,6 +60,9 @@ struct ThrowPlan {
 
 /// The middle of all joints' ranges; 0 where there is none.
 JointVector<double> middle_of(const Chain& chain);
+
+/// The chain's own home; where it tells none, middle_of [rad].
+JointVector<double> rest_pose(const Chain& chain);
 
 /// Largest distance of a landing from the middle [m]; infinite if one does not land.
 double largest_miss(const std::vector<LandingAt>& landings);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "contact/registry.hpp"
@@ -164,11 +165,13 @@ std::optional<ReleaseSpread> release_spread(const ReleaseThrow& problem) {
 }
 
 void summarise(Landings& out) {
-  out.mean = out.std = 0;
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   const auto n = static_cast<double>(out.miss.size());
+  out.mean = n > 0 ? 0 : kNone;
   for (const double x : out.miss) out.mean += x / n;
-  for (const double x : out.miss) out.std += (x - out.mean) * (x - out.mean) / std::max(1.0, n - 1);
-  out.std = std::sqrt(out.std);
+  double square = n > 1 ? 0 : kNone;
+  for (const double x : out.miss) square += (x - out.mean) * (x - out.mean) / (n - 1);
+  out.std = std::sqrt(square);
 }
 
 Draw Draws::next() {

@@ -87,7 +87,7 @@ class HeldMotion;
 struct Landings {
   std::vector<double> miss;  ///< of those that land [m]
   int lost{};                ///< slipping before the gripper opens, not free in time, or never down
-  double mean{}, std{};      ///< of those that land [m]
+  double mean{}, std{};      ///< of those that land [m]; NaN where fewer than one, or two, do
 };
 /// Mean and standard deviation of what landed.
 void summarise(Landings& landings);

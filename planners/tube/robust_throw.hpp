@@ -27,7 +27,7 @@ struct RobustThrow {
 /// the limits, above the base, and over which the nominal grip holds the object, the one that drops the
 /// fewest draws (of these the fastest); nothing where none does, and `reason`, where given, says why. The way
 /// to a throw to begin with: plan_throw with a chain up to the object's centre of mass, in the vertical plane
-/// of the target (make_planar). Throws std::invalid_argument as make_insensitive and throw_motion do.
+/// of the target (planar_joints). Throws std::invalid_argument as make_insensitive and throw_motion do.
 std::optional<RobustThrow> plan_robust_throw(const ReleaseThrow& problem, const JointVector<double>& home,
                                              std::string* reason = nullptr);
 

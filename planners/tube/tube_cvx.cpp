@@ -20,6 +20,7 @@ void check(const TubeProblem& p) {
   require_joints(p.chain, "tube", "qd", p.start.qd);
   require(p.window > 0 && p.window <= 1, "tube", "window", p.window, "(0, 1] s");
   for (const double x : p.target) require(std::isfinite(x), "tube", "target", x, "(-inf, inf) m");
+  require_distinct(p.chain, "tube, held", p.held);
 }
 
 /// What is known at the window's end before q̈ is: kinematics, and the flow map without acceleration.
@@ -96,7 +97,8 @@ TubeProgram program_of(const TubeProblem& p, const End& end) {
                  across = end.J.topRows<2>().transpose() * Vector2d(-end.along.y(), end.along.x());
   add("the throw's direction", T * across, -across.dot(p.start.qd), true);
   const auto& gradient = end.flow->gradient;
-  const QpVector row = gradient[2] * ahead + gradient[3] * up;
+  QpVector row = gradient[2] * ahead + gradient[3] * up;
+  for (const int i : p.held) row[i] = 0;
   const double now = gradient[2] * end.state.r_rate + gradient[3] * end.state.z_rate;
   add("the landing", T * row, now - row.dot(p.start.qd) - end.flow->landing, true);
   add_limits(p, QpVector::Zero(n),
@@ -228,7 +230,9 @@ double refine_cost(const TubeProblem& p, const Vector2d& along, const JointVecto
     } else {
       const auto miss = miss_at(p, along, seeded, t);
       if (!miss) return JointLimits::kNone;
-      add(miss->forward);
+      Dual forward = miss->forward;
+      for (const int i : p.held) forward.v[i] = 0;
+      add(forward);
       add(miss->across);
     }
   }

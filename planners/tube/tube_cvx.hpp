@@ -23,6 +23,9 @@ struct TubeProblem {
   Eigen::Vector3d target;   ///< B, in the base [m]
   double window{0.1};       ///< T [s]
   flight::Medium medium{};  ///< of the flight
+  /// Joints that are not asked for the landing's distance: they accelerate only if the throw's direction
+  /// needs them to, which planar throws do not.
+  std::vector<int> held{};
 };
 
 /// How the problem ended.
@@ -46,7 +49,8 @@ struct TubeSolution {
 ///
 /// The problem only asks for a q̈; of all, the smallest ½ Σ (q̈_i/q̈_max,i)² is taken, which is a quadratic
 /// program with one solution. Beyond the printed constraints, q_T must obey the position limits, or the
-/// answer is infeasible. Throws std::invalid_argument for sizes that differ or a window outside (0, 1] s.
+/// answer is infeasible. Throws std::invalid_argument for sizes that differ, a window outside (0, 1] s, or
+/// held joints that the chain does not have, or twice.
 TubeSolution solve_tube(const TubeProblem& problem);
 
 /// Where the object really lands when it leaves at t under a constant q̈ (problem RTV, [DarkoD46] Eq. 1: q(t)

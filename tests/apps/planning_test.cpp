@@ -6,6 +6,7 @@
 #include <regex>
 
 #include "tests/apps/cli.hpp"
+#include "tests/planners/ur5.hpp"
 
 namespace unhand::cli {
 namespace {
@@ -94,6 +95,92 @@ TEST_F(Cli, PlansAThrowOfAnArmFromUrdf) {
   EXPECT_EQ(told["predicted"]["planned"]["landed"], 50);
   EXPECT_NE(told["q0_rad"][0], 0.0) << "the shoulder is no turntable: it is searched like the others";
   EXPECT_LE(told["limits"]["acceleration"]["fraction"], 1 + 1e-9);
+}
+
+/// A card of a pivot whose gripper is known, with scatter of the grasp; friction to `mu_sigma`.
+void write_pivot_card(const fs::path& file, double grip_force, double mu_sigma, double dead_time = 0.02) {
+  std::ofstream(file) << fmt::format(
+      R"({{"schema": "model-card", "schema_version": 1, "model": "sliding_pivot", "library_version": "0",
+      "log": {{"file": "made by a test"}}, "parameters": {{"mu": {{"value": 0.5, "sigma": {}, "unit": "-"}},
+      "length": {{"value": 0.007, "sigma": 1e-4, "unit": "m"}},
+      "grip_force": {{"value": {}, "unit": "N"}}, "dead_time": {{"value": {}, "sigma": 0.003, "unit": "s"}},
+      "opening_time": {{"value": 0.06, "sigma": 0.004, "unit": "s"}}, "shape": {{"value": 1.5, "unit": "-"}}}},
+      "own_spreads": {{"grasp_offset": {{"sigma": 0.003, "unit": "m"}},
+                       "grasp_angle": {{"sigma": 0.01, "unit": "rad"}}}}}})",
+      mu_sigma, grip_force, dead_time);
+}
+
+// The middle of a UR5's ranges is no pose to rest in; its file or --home tells one.
+TEST_F(Cli, AThrowBeginsWhereTheArmCanRest) {
+  std::ofstream(folder / "ur5.toml") << planners::kUr5;
+  std::ofstream(folder / "bent.toml") << "home_rad = [0.1, -1.5, 1.5, 0, -1.5, 0]\n" << planners::kUr5;
+  const std::string plan = "plan throw --target 0.9,0.3,0 --samples 300 --draws 20 --report out --arm ";
+  expect_refusal(plan + "ur5.toml", 1,
+                 "no_rest: at rest at (0, 0, 0, 0, 0, 0) deg the arm's lowest joint or what it throws is at "
+                 "-0.005 m; accepted: above its base, > 0 m (this pose is the middle of its joints' ranges; "
+                 "--home gives another)");
+  expect_refusal(plan + "bent.toml --home 0,0,0,0,0,0", 1, "(this pose is --home; --home gives another)");
+  expect_refusal(plan + "ur5.toml --home 0,-90,90", 2, "--home: '0,-90,90' is not 6 numbers with ','");
+  expect_refusal(plan + "ur5.toml --home 0,-400,90,0,-90,0", 2,
+                 "--home: -400 deg of joint 'shoulder' is not in [-360, 360] deg");
+  const auto begins_at = [&](const std::string& options) {
+    const Answer answer = run(plan + options);
+    EXPECT_EQ(answer.code, 0) << answer.err;
+    const auto motion = columns_of(content(folder / "out/trajectory.csv"));
+    std::vector<double> out;
+    for (int i = 1; i <= 6; ++i) out.push_back(std::stod(motion.at(fmt::format("q{}_rad", i)).front()));
+    return out;
+  };
+  EXPECT_EQ(begins_at("bent.toml"), (std::vector{0.1, -1.5, 1.5, 0.0, -1.5, 0.0}));
+  const auto given = begins_at("bent.toml --home 0,-90,90,0,-90,30");
+  for (const auto& [i, degrees] : {std::pair{0, 0}, {1, -90}, {2, 90}, {5, 30}})
+    EXPECT_NEAR(given[static_cast<std::size_t>(i)], degrees * std::numbers::pi / 180, 1e-8);
+}
+
+// Its shoulder, elbow and first wrist joint throw in the plane of the target, with a card or without.
+TEST_F(Cli, AUr5ThrowsInThePlaneOfItsTarget) {
+  std::ofstream(folder / "ur5.toml") << planners::kUr5;
+  write_pivot_card(folder / "card.json", 80, 0.03);
+  const std::string plan =
+      "plan throw --target 0.9,0.3,0 --samples 300 --draws 20 --arm ur5.toml --json p.json ";
+  for (const std::string how : {"--planar", "--card card.json"}) {
+    const Answer answer = run(plan + "--home 0,-90,90,0,-90,0 " + how);
+    ASSERT_EQ(answer.code, 0) << answer.err;
+    json told = read_json(folder / "p.json");
+    for (const std::size_t held : {0u, 4u, 5u}) {
+      EXPECT_EQ(told["qd0_rad_s"][held], 0) << how;
+      EXPECT_NEAR(told["qdd_rad_s2"][held].get<double>(), 0, 1e-6) << how;
+    }
+    for (const json& across : told["window_landings"]["planned"]["across_m"])
+      EXPECT_NEAR(across.get<double>(), 0, 1e-6) << how;
+  }
+  std::string stiff = planners::kUr5;  // its tool cannot be turned into the plane
+  const auto wrist = stiff.find("lower_rad", stiff.find("wrist_2"));
+  stiff.replace(wrist, stiff.find("velocity", wrist) - wrist, "lower_rad = -1\nupper_rad = 1\n");
+  std::ofstream(folder / "ur5.toml") << stiff;
+  const std::string bent = plan + "--home 0,-90,90,0,-50,0 ";
+  expect_refusal(bent + "--planar", 1, "no_plane: ur5.toml cannot throw in the vertical plane of the target");
+  expect_refusal(bent + "--planar", 1, "plan it without --planar");
+  expect_refusal(bent + "--card card.json", 1, "plan it without --card");
+}
+
+// One landing has a mean and a distance, and no spread.
+TEST_F(Cli, OneDrawHasNoSpread) {
+  write_pivot_card(folder / "card.json", 80, 0.03);
+  for (const std::string how : {"", "--card card.json"}) {
+    const Answer answer =
+        run("plan throw --target 1.3,0,-0.2 --samples 100 --draws 1 --json p.json --report out " + how);
+    ASSERT_EQ(answer.code, 0) << answer.err;
+    json told = read_json(folder / "p.json");
+    for (auto& [name, one] : told["predicted"].items()) {
+      EXPECT_TRUE(one["std_m"].is_null()) << name;
+      EXPECT_TRUE(one["std_across_m"].is_null()) << name;
+      EXPECT_NEAR(one["rms_m"].get<double>(),
+                  std::hypot(one["mean_m"].get<double>(), one["mean_across_m"].get<double>()), 1e-12);
+      EXPECT_THAT(answer.out, testing::ContainsRegex(fmt::format(
+                                  "{} +1 +[0-9.]+ % +[-+0-9.]+ +- +[-+0-9.]+ +- +[0-9.]+", name)));
+    }
+  }
 }
 
 /// The last row of a block of a figure's data.
@@ -409,6 +496,35 @@ TEST_F(Cli, ElasticThrowsReachTheirTargets) {
               HasSubstr("--target 9: no throw was found to a target at 9 m, 0.5 m below the shoulder"));
   EXPECT_THAT(far.err, testing::ContainsRegex("found throws to targets from [0-9.]+ to [2-8][.][0-9]+ m"));
   EXPECT_THAT(far.err, Not(HasSubstr("make_table")));
+}
+
+// What no run confirms is not to be made, and not an answer.
+TEST_F(Cli, ElasticThrowsThatNoRunConfirmsAreNoAnswer) {
+  const fs::path arms = fs::path(UNHAND_SOURCE_DIR) / "planners/elastic";
+  std::string arm = content(arms / "bsa3.toml");
+  for (const auto& [from, to] :
+       {std::pair<std::string, std::string>{"motor_speed_rad_s = 4.5", "motor_speed_rad_s = 0.2"},
+        {"damping_n_m_s_rad = 0.02", "damping_n_m_s_rad = 5"}})
+    arm.replace(arm.find(from), from.size(), to);
+  std::ofstream(folder / "slow.toml") << arm;
+  std::ofstream(folder / "bsa3_chain.toml") << content(arms / "bsa3_chain.toml");
+  const Answer fastest = run("plan elastic --arm slow.toml --starts 1 --intervals 8 --json e.json");
+  EXPECT_EQ(fastest.code, 1);
+  json drives = read_json(folder / "e.json")["drives"];
+  const std::string told = fastest.err.substr(0, fastest.err.find(" is confirmed by its run"));
+  for (auto& [name, drive] : drives.items()) {
+    bool confirmed = false;
+    for (json& basin : drive["basins"]) confirmed |= basin["confirmed"].get<bool>();
+    EXPECT_EQ(told.find(name) == std::string::npos, confirmed) << name << ": " << told;
+  }
+  EXPECT_THAT(told, HasSubstr("no throw of BRK -> SEA"));
+  EXPECT_THAT(fastest.out, HasSubstr("not confirmed"));
+
+  const Answer table = run(
+      "plan elastic --target 2.2 --longest 10 --starts 1 --intervals 4 --nodes 4 --checks 2 --json t.json");
+  EXPECT_EQ(table.code, 1);
+  EXPECT_THAT(table.err, HasSubstr("no node of the table is confirmed by its run"));
+  for (const json& node : read_json(folder / "t.json")["nodes"]) EXPECT_FALSE(node["confirmed"]);
 }
 
 TEST_F(Cli, AnElasticWristThrowsFaster) {
@@ -892,18 +1008,6 @@ TEST_F(Cli, OutputsOfAPlannedThrowAgree) {
   EXPECT_EQ(plain["qdd_rad_s2"], plain["qdd_tube_cvx_rad_s2"]);
 }
 
-/// A card of a pivot whose gripper is known, with scatter of the grasp; friction to `mu_sigma`.
-void write_pivot_card(const fs::path& file, double grip_force, double mu_sigma, double dead_time = 0.02) {
-  std::ofstream(file) << fmt::format(
-      R"({{"schema": "model-card", "schema_version": 1, "model": "sliding_pivot", "library_version": "0",
-      "log": {{"file": "made by a test"}}, "parameters": {{"mu": {{"value": 0.5, "sigma": {}, "unit": "-"}},
-      "length": {{"value": 0.007, "sigma": 1e-4, "unit": "m"}},
-      "grip_force": {{"value": {}, "unit": "N"}}, "dead_time": {{"value": {}, "sigma": 0.003, "unit": "s"}},
-      "opening_time": {{"value": 0.06, "sigma": 0.004, "unit": "s"}}, "shape": {{"value": 1.5, "unit": "-"}}}},
-      "own_spreads": {{"grasp_offset": {{"sigma": 0.003, "unit": "m"}},
-                       "grasp_angle": {{"sigma": 0.01, "unit": "rad"}}}}}})",
-      mu_sigma, grip_force, dead_time);
-}
 void write_bar(const fs::path& file, double mass, double com_offset) {
   std::ofstream(file) << fmt::format(
       "name='bar'\nsurface='paper'\nmass_kg={}\ncom_offset_m={}\ncom_offset_sigma_m=0.004\ninertia_kg_m2={}"

@@ -83,6 +83,8 @@ TEST_F(ChainFile, Toml) {
   Chain arm = read_chain(put("arm.toml", two_links));
   EXPECT_EQ(arm.name, "two links");
   EXPECT_EQ(arm.joints[1].limits.jerk, 5000);
+  EXPECT_EQ(arm.home.size(), 0);
+  EXPECT_EQ(read_chain(put("rests.toml", "home_rad = [0.5, -1]\n" + two_links)).home, (Joints{{0.5, -1}}));
   arm.joints[0].origin.p[2] = 0.3;  // modified parameters cannot put the first axis, which is level, there
   expect_two_links(arm);
 }
@@ -94,6 +96,8 @@ TEST_F(ChainFile, TomlMistakesAreToldWhereTheyAre) {
     EXPECT_THAT([&] { read_toml_chain(put("bad.toml", text)); },
                 testing::ThrowsMessage<datasets::TomlError>(HasSubstr(why)));
   };
+  refused("source", "home_rad = [0.5]\nsource", "home_rad: [ 0.5 ] is not a list of 2 numbers");
+  refused("source", "home_rad = [3, 0]\nsource", "home of joint 'shoulder': 3 is not in [-2.5, 2.5] rad");
   refused("mass_kg = 2.0", "mass_kg = -2", "bad.toml:9:11: mass_kg: -2 is outside [0, 10000] kg");
   refused("jerk_rad", "jrek_rad", ": unknown key: did you mean 'jerk_rad_s3'?");
   refused("name = \"elbow\"", "", "name: required key is missing");

@@ -12,6 +12,7 @@
 #include "planners/arm/dynamics.hpp"
 #include "planners/arm/panda.hpp"
 #include "planners/tube/plan_throw.hpp"
+#include "planners/tube/planar_joints.hpp"
 #include "tests/planners/ipopt_qp.hpp"
 
 namespace unhand::planners {
@@ -26,10 +27,9 @@ TargetBox box_at(double x, double y, double z) { return {{x, y, z}, 0.15, 0.15};
 std::vector<TargetBox> boxes() {
   return {box_at(1.3, 0, -0.2), box_at(1.1, 0, 0), box_at(1.3, 0, -0.3), box_at(0, -0.7, 0.7)};
 }
-NominalOptions planar() {
+NominalOptions planar(const TargetBox& box) {
   NominalOptions out;
-  out.fixed = {{2, 0.0}, {4, 0.0}, {6, std::numbers::pi / 4}};
-  out.face_target = true;
+  out.fixed = *planar_joints(thrower(), panda_ready(), box.middle);
   return out;
 }
 NominalOptions few() {
@@ -229,7 +229,7 @@ TEST(TubeCvx, RefinementNeverMissesMore) {
 
 TEST(TubeCvx, SaysWhyThereIsNone) {
   Chain arm = thrower();
-  const auto one = find_throws(arm, boxes()[0], planar()).front();
+  const auto one = find_throws(arm, boxes()[0], planar(boxes()[0])).front();
   const auto answer = [&](const Chain& chain, const ThrowState& state, const Eigen::Vector3d& target) {
     return solve_tube({chain, state, target, 0.1});
   };
@@ -258,7 +258,7 @@ TEST(PlanThrow, ReachesTheBoxesWithinTheLimits) {
   options.home = Joints{{0, -0.785, 0, -2.356, 0, 1.571, 0.785}};
   for (const TargetBox& box : boxes())
     for (const bool plane : {true, false}) {
-      options.search = plane ? planar() : NominalOptions{};
+      options.search = plane ? planar(box) : NominalOptions{};
       const auto result = plan_throw(arm, box, options);
       ASSERT_EQ(result.outcome, PlanOutcome::planned) << result.reason;
       const ThrowPlan& plan = *result.plan;
@@ -283,7 +283,7 @@ TEST(PlanThrow, SaysWhyThereIsNone) {
     EXPECT_EQ(own.outcome, PlanOutcome::no_throw);
     EXPECT_THAT(own.reason, testing::HasSubstr("flies through the arm's own column"));
   }
-  options.search = planar();
+  options.search = planar(boxes()[0]);
   Chain arm = thrower();
   for (Joint& joint : arm.joints) joint.limits.torque = 1;  // it cannot even hold itself
   const auto weak = plan_throw(arm, boxes()[0], options);
@@ -353,7 +353,7 @@ TEST(TubeCvx, ReckonsWithTheDragOfTheFlight) {
 
 // Whichever way a joint moves, the window ends before it is at its stop.
 TEST(TubeCvx, KeepsBothPositionLimitsAtTheWindowsEnd) {
-  const auto one = find_throws(thrower(), boxes()[0], planar()).front();
+  const auto one = find_throws(thrower(), boxes()[0], planar(boxes()[0])).front();
   int up = 0, down = 0;
   for (int i = 0; i < 7; ++i) {
     const double rate = one.state.qd[i];
@@ -391,7 +391,7 @@ TEST(NominalThrow, LeavesRoomForItsWindow) {
 TEST(NominalThrow, IsInThePlaneOfItsTarget) {
   const Chain arm = thrower();
   for (const TargetBox& box : {box_at(0.6, 1.1, -0.2), box_at(-1.3, 0.1, -0.2), box_at(-1.3, -0.5, -0.2)}) {
-    NominalOptions options = planar();
+    NominalOptions options = planar(box);
     options.samples = 600;
     for (const auto& one : find_throws(arm, box, options)) {
       const auto tip = tip_motion<double>(arm, one.state.q, one.state.qd, Joints::Zero(7));
@@ -423,9 +423,20 @@ TEST(PlanThrow, StaysAboveItsBase) {
   options.home = Joints{{0, 1.5, 0, -1.0, 0, 2.6, 0.785}};
   const Chain arm = thrower();
   ASSERT_LT(forward_kinematics(arm, options.home).p.z(), -0.02);
-  const auto result = plan_throw(arm, boxes()[0], options);
-  EXPECT_EQ(result.outcome, PlanOutcome::no_motion);
-  EXPECT_THAT(result.reason, testing::HasSubstr("the arm would come down to -0."));
+  EXPECT_EQ(plan_throw(arm, boxes()[0], options).outcome, PlanOutcome::no_rest);
+  // Two links that rest level behind their shoulder swing through below it to throw forward.
+  Joint shoulder{"shoulder", modified_dh(0, std::numbers::pi / 2, 0), {}, {-3, 3, 4, 40, 5000}};
+  shoulder.origin.p.z() = 0.3;
+  const Chain links{"links",
+                    {shoulder, {"elbow", modified_dh(0.5, 0, 0), {}, {-2.5, 2.5, 6, 60, 5000}}},
+                    modified_dh(0.4, 0, 0)};
+  options.home = Joints{{-2.95, 0.0}};
+  ASSERT_GT(forward_kinematics(links, options.home).p.z(), 0.05);
+  const auto below = plan_throw(links, {{1.3, 0, -0.2}}, options);
+  EXPECT_EQ(below.outcome, PlanOutcome::no_motion);
+  EXPECT_THAT(below.reason, testing::HasSubstr("the arm would come down to -0."));
+  options.home = Joints{{2.5, 0.0}};
+  EXPECT_EQ(plan_throw(links, {{1.3, 0, -0.2}}, options).outcome, PlanOutcome::planned);
 }
 
 // Braking begins with the acceleration of the window: what that adds to a velocity at its limit is left room
@@ -437,7 +448,7 @@ TEST(PlanThrow, LeavesRoomForItsBrake) {
                                           {0.2, 0.0, box_at(1.2, 0, 0)}}) {
     PlanOptions options;
     options.home = panda_ready();
-    options.search = planar();
+    options.search = planar(box);
     options.search.samples = 100;
     options.search.window = window;
     options.search.medium.drag_k = drag;
@@ -452,7 +463,7 @@ TEST(PlanThrow, LeavesRoomForItsBrake) {
 TEST(PlanThrow, TellsTheLimitsThatItsMotionUses) {
   const Chain arm = thrower();
   PlanOptions options;
-  options.search = planar();
+  options.search = planar(boxes()[1]);
   const auto result = plan_throw(arm, boxes()[1], options);
   ASSERT_TRUE(result.plan) << result.reason;
   const LimitCheck dense = check_limits(arm, result.plan->motion);
@@ -466,7 +477,7 @@ TEST(PlanThrow, TellsTheLimitsThatItsMotionUses) {
 // From any pose to a throw: the way there, the swing and the brake take no more than their share.
 TEST(ThrowMotion, KeepsItsShareOfTheLimits) {
   const Chain arm = thrower();
-  const auto one = find_throws(arm, boxes()[0], planar()).front();
+  const auto one = find_throws(arm, boxes()[0], planar(boxes()[0])).front();
   std::mt19937_64 random(5);
   std::uniform_real_distribution<double> part(0.2, 0.8);
   for (int k = 0; k < 20; ++k) {
