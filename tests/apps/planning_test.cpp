@@ -617,6 +617,19 @@ TEST_F(Cli, ThrowFlipRefusesWhatItCannotDo) {
   EXPECT_THAT(far.err, HasSubstr("note: out of reach of the robot as declared"));
 }
 
+// What was seen of the bar's own throws is the error before, whoever learns from them.
+TEST_F(Cli, ThrowFlipBeginsFromTheMeasuredError) {
+  const auto before = [&](const std::string& learner) {
+    EXPECT_EQ(
+        run("plan flip --target 1.2,180 --seed 3 --iterations 1 --json f.json --learner " + learner).code, 0);
+    const auto found = nlohmann::json::parse(content(folder / "f.json"));
+    EXPECT_EQ(found["initial_error_is_seen"], true) << learner;
+    EXPECT_LE(found["minimum_error"], found["initial_error"]);
+    return found["initial_error"].get<double>();
+  };
+  EXPECT_EQ(before("m4"), before("m2"));
+}
+
 // Robot 1 throws two of three into the tolerances at once, and all of them the next time.
 TEST_F(Cli, ThrowFlipTellsTwoThirdsFromAll) {
   const Answer answer = run("plan flip --target 1.2,180 --seed 1 --iterations 3 --learner m1 --json f.json");
