@@ -607,6 +607,10 @@ TEST_F(Cli, ThrowFlipRefusesWhatItCannotDo) {
   expect_refusal(aim + "--seed -1", 2, "-1 is not a whole number from 0 to");
   expect_refusal(aim + "--card card.json", 2, "--card: only --learner m4");
   expect_refusal(aim + "--com-offset 0.9", 1, "lands this bar with none of its commands");
+  std::ofstream(folder / "heavy.toml") << "name = 'h'\nmass_kg = 5\ninertia_kg_m2 = 2e-2\n"
+                                          "com_offset_m = 0.12\nsurface = 'printed'\n";
+  expect_refusal(aim + "--sku heavy.toml", 1,
+                 "whose friction is 39.6 N at most against its weight of 49.1 N");
   expect_refusal(aim + "--robot none.toml", 3, "none.toml");
   std::ofstream(folder / "sku.toml") << "name = 'b'\nmass_kg = 0.3\ninertia_kg_m2 = 4e-7\n"
                                         "com_offset_m = 0.15\nsurface = 'printed'\n";
