@@ -614,6 +614,18 @@ TEST_F(Cli, ThrowFlipRefusesWhatItCannotDo) {
   expect_refusal(aim + "--sku heavy.toml", 1,
                  "whose friction is 39.6 N at most against its weight of 49.1 N");
   expect_refusal(aim + "--robot none.toml", 3, "none.toml");
+  const auto robot_with = [&](const std::string& from, const std::string& to) {
+    std::string text = content(fs::path(UNHAND_SOURCE_DIR) / "planners/flip/robot.toml");
+    const auto at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    std::ofstream(folder / "robot.toml") << text.replace(at, from.size(), to);
+  };
+  robot_with("window_s = 0.16", "window_s = 0.02");
+  expect_refusal(aim + "--robot robot.toml", 1,
+                 "it is not free within window_s = 0.02 s after the brake's start");
+  robot_with("pose_rad = [0,", "pose_rad = [0.7,");
+  expect_refusal(aim + "--robot robot.toml", 3,
+                 "from y to the axis of panda_joint2 is 0.700; accepted: 0.000 to");
   std::ofstream(folder / "sku.toml") << "name = 'b'\nmass_kg = 0.3\ninertia_kg_m2 = 4e-7\n"
                                         "com_offset_m = 0.15\nsurface = 'printed'\n";
   expect_refusal(aim + "--sku sku.toml", 3,
