@@ -155,8 +155,8 @@ double mean_of(const std::vector<ct::StudyThrow>& throws, double ct::StudyThrow:
 
 Table table_of(const std::vector<Cell>& cells) {
   Table out{
-      {"object", "controller", "in the box", "mean miss [mm]", "std along, across [mm]", "rms miss [mm]",
-       "error at the release [mm, mm/s]", "speed, acceleration, jerk, torque used [%]"},
+      {"object", "controller", "in the box", "mean miss along, across [mm]", "std along, across [mm]",
+       "rms miss [mm]", "error at the release [mm, mm/s]", "speed, acceleration, jerk, torque used [%]"},
       {},
       2};
   for (const Cell& cell : cells) {
@@ -164,7 +164,9 @@ Table table_of(const std::vector<Cell>& cells) {
     const int landed = d.throws - d.lost;
     out.rows.push_back(
         {fmt::format("{}, {:.0f} g", cell.payload.name, 1e3 * cell.payload.mass), cell.controller.name,
-         fmt::format("{}/{}", d.hits, d.throws), landed > 0 ? with_sign(1e3 * d.mean.x(), 1) : "-",
+         fmt::format("{}/{}", d.hits, d.throws),
+         landed > 0 ? fmt::format("{}, {}", with_sign(1e3 * d.mean.x(), 1), with_sign(1e3 * d.mean.y(), 1))
+                    : "-",
          fmt::format("{}, {}", fixed(landed > 1, 1e3 * d.std.x(), 1), fixed(landed > 1, 1e3 * d.std.y(), 1)),
          fixed(landed > 0, 1e3 * d.rms, 1),
          fmt::format("{:.1f}, {:.1f}", 1e3 * mean_of(cell.throws, &ct::StudyThrow::release_position_error),
