@@ -154,21 +154,25 @@ double mean_of(const std::vector<ct::StudyThrow>& throws, double ct::StudyThrow:
 }
 
 Table table_of(const std::vector<Cell>& cells) {
-  Table out{{"object", "controller", "in the box", "mean miss [mm]", "std along, across [mm]",
-             "rms miss [mm]", "error at the release [mm, mm/s]", "torque used"},
-            {},
-            2};
+  Table out{
+      {"object", "controller", "in the box", "mean miss along, across [mm]", "std along, across [mm]",
+       "rms miss [mm]", "error at the release [mm, mm/s]", "speed, acceleration, jerk, torque used [%]"},
+      {},
+      2};
   for (const Cell& cell : cells) {
     const auto& d = cell.landed;
     const int landed = d.throws - d.lost;
     out.rows.push_back(
         {fmt::format("{}, {:.0f} g", cell.payload.name, 1e3 * cell.payload.mass), cell.controller.name,
-         fmt::format("{}/{}", d.hits, d.throws), landed > 0 ? with_sign(1e3 * d.mean.x(), 1) : "-",
+         fmt::format("{}/{}", d.hits, d.throws),
+         landed > 0 ? fmt::format("{}, {}", with_sign(1e3 * d.mean.x(), 1), with_sign(1e3 * d.mean.y(), 1))
+                    : "-",
          fmt::format("{}, {}", fixed(landed > 1, 1e3 * d.std.x(), 1), fixed(landed > 1, 1e3 * d.std.y(), 1)),
          fixed(landed > 0, 1e3 * d.rms, 1),
          fmt::format("{:.1f}, {:.1f}", 1e3 * mean_of(cell.throws, &ct::StudyThrow::release_position_error),
                      1e3 * mean_of(cell.throws, &ct::StudyThrow::release_velocity_error)),
-         fmt::format("{:.0f} %", 100 * d.largest_torque_use)});
+         fmt::format("{:.0f}, {:.0f}, {:.0f}, {:.0f}", 100 * d.use.velocity, 100 * d.use.acceleration,
+                     100 * d.use.jerk, 100 * d.use.torque)});
   }
   return out;
 }
@@ -192,7 +196,12 @@ Json json_of(const std::vector<Cell>& cells, const PlanControlOptions& o) {
          {"rms_m", landed > 0 ? Json(d.rms) : Json(nullptr)},
          {"release_position_error_m", mean_of(cell.throws, &ct::StudyThrow::release_position_error)},
          {"release_velocity_error_m_s", mean_of(cell.throws, &ct::StudyThrow::release_velocity_error)},
-         {"torque_use", d.largest_torque_use}});
+         {"limits",
+          {{"position", d.use.position},
+           {"velocity", d.use.velocity},
+           {"acceleration", d.use.acceleration},
+           {"jerk", d.use.jerk},
+           {"torque", d.use.torque}}}});
   }
   return out;
 }

@@ -62,6 +62,35 @@ fl::Bar bar_of(const PlanFlipOptions& o, const fl::FlipRobot& robot) {
   return out;
 }
 
+/// Why the robot as declared lands the library's bar with none of its commands.
+std::string why_none_lands(const fl::HandLibrary& library) {
+  const fl::FlipRobot& robot = library.robot();
+  const planners::ReleaseCard card = fl::prior_card(robot, robot.pads.law);
+  const double offset = library.bar().com_offset;
+  double least = std::numeric_limits<double>::infinity(), most = 0;  // way through the pads [m]
+  std::size_t free = 0;
+  for (std::size_t i = 0; i < library.commands().size(); ++i) {
+    const auto release = fl::predicted_release(library.hand(i), card, library.bar());
+    if (!release) continue;
+    ++free;
+    const auto& [x, z, angle, vx, vz, omega] = release->detach;
+    const double slip = std::hypot(x - offset * std::cos(angle) - release->hand[0],
+                                   z - offset * std::sin(angle) - release->hand[1]);
+    least = std::min(least, slip), most = std::max(most, slip);
+  }
+  if (free == 0)
+    return fmt::format("it is not free within window_s = {:g} s after the brake's start",
+                       robot.motion.window);
+  return fmt::format(
+      "{} of {} let it go within window_s = {:g} s after the brake's start, but it never comes down to "
+      "height "
+      "0; before, it slips {:.2g} to {:.2g} m through the pads, whose friction is {:.3g} N at most against "
+      "its weight of {:.3g} N",
+      free, library.commands().size(), robot.motion.window, least, most,
+      robot.pads.count * robot.pads.mu * robot.gripper.grip_force,
+      -planners::kGravity.z() * library.bar().mass);
+}
+
 /// Refuses a target beyond whatever a robot of this kind could reach, and says on stderr where it is
 /// doubtful.
 void check_reach(const fl::FlipTarget& target, const fl::HandLibrary& library) {
@@ -77,10 +106,8 @@ void check_reach(const fl::FlipTarget& target, const fl::HandLibrary& library) {
   }
   const auto& [x, angle] = target.pose;
   if (error == most)
-    throw Unanswered(
-        fmt::format("{}: as declared it lands this bar with none of its commands (it must be free within "
-                    "window_s = {:g} s after the brake's start)",
-                    library.robot().name, library.robot().motion.window));
+    throw Unanswered(fmt::format("{}: as declared it lands this bar with none of its commands: {}",
+                                 library.robot().name, why_none_lands(library)));
   if (!(x >= low.x - beyond_x && x <= high.x + beyond_x && angle >= low.angle - beyond_angle &&
         angle <= high.angle + beyond_angle))
     throw WrongUsage(fmt::format(

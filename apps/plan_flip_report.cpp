@@ -265,6 +265,18 @@ void draw_population(const FlipAnswer& a, const std::filesystem::path& folder) {
   draw(figure, folder, "simulated by unhand plan flip");
 }
 
+/// The largest shares of the joints' limits over the path: its commands keep them, their brake may not.
+std::string used_limits(const fl::LearningPath& path) {
+  fl::ArmUse most;
+  for (const auto& one : path.iterations)
+    for (const auto& t : one.trials)
+      for (double fl::ArmUse::*limit : {&fl::ArmUse::position, &fl::ArmUse::velocity, &fl::ArmUse::torque})
+        most.*limit = std::max(most.*limit, t.use.*limit);
+  return fmt::format("Limits used at most: position {:.1f} %, speed {:.1f} %, torque {:.1f} %{}\n",
+                     100 * most.position, 100 * most.velocity, 100 * most.torque,
+                     std::max(most.position, most.velocity) > 1 ? ": the brake goes beyond" : "");
+}
+
 /// What was thrown, what was known before, and what came of it.
 std::string summary(const FlipAnswer& a) {
   const double own = 100 * a.bar.com_offset, known = 100 * a.known_bar.com_offset;
@@ -280,10 +292,10 @@ std::string summary(const FlipAnswer& a) {
       most == a.throws ? "" : fmt::format("at least {} of {} {}, ", most, a.throws, reached(a.path, most));
   return out + fmt::format(
                    "\nError {:.2f} before{}, {:.2f} after one iteration, {:.2f} at least; throws within the "
-                   "tolerances: {}all {} {}{}\n",
+                   "tolerances: {}all {} {}{}\n{}",
                    a.path.initial, a.path.initial_is_seen ? "" : " (expected, not seen)", a.path.first(),
                    a.path.minimum(), some, a.throws, reached(a.path, a.throws),
-                   a.path.gave_up ? "; the learner had no command left to try" : "");
+                   a.path.gave_up ? "; the learner had no command left to try" : "", used_limits(a.path));
 }
 
 }  // namespace

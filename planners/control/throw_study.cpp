@@ -238,7 +238,7 @@ class Run {
 
   /// The object's landing, from its centre at the release: the rest of the last control step is a straight
   /// line.
-  StudyThrow let_go() {
+  void let_go() {
     out_.estimate = controller_->estimate;
     const Chain to_object = with_tool(known_, {Eigen::Matrix3d::Identity(), object_.com});
     const TipMotion<double> object = tip_motion<double>(to_object, robot_.q, robot_.qd, Joints::Zero(7));
@@ -255,6 +255,13 @@ class Run {
     out_.lands = landed.has_value();
     out_.miss = landed.value_or(nowhere) - target.value_or(nowhere);
     out_.hit = out_.lands && (out_.miss.cwiseAbs().array() <= half.array()).all();
+    robot_.truth = known_;
+  }
+
+  /// The empty hand stops.
+  StudyThrow brake() {
+    const int end = static_cast<int>(std::lround((options_.throw_time + options_.brake_time) / kStep));
+    for (int k = steps_to_release(); k < end; ++k) step(course_.at(k * kStep, orientation_));
     return std::move(out_);
   }
 
@@ -278,11 +285,27 @@ class Run {
       control = controller_->task_law(reference, gains_, q, qd);
     }
     Joints applied = control.torque.cwiseMin(limit_).cwiseMax(-limit_);
-    out_.torque_use = std::max(out_.torque_use, control.torque.cwiseQuotient(limit_).cwiseAbs().maxCoeff());
     controller_->adapt(control, applied, q, qd, kStep);
-    for (int i = 0; i < 7; ++i) applied[i] += options_.torque_noise * normal();
+    for (int i = 0; i < 7; ++i) applied[i] += options_.torque_noise * limit_[i] * normal();
+    const Joints rate = robot_.qd;
     robot_.advance(applied);
+    monitor(control.torque, (robot_.qd - rate) / kStep);
     return control;
+  }
+
+  /// What the step took of the joints' limits.
+  void monitor(const Joints& torque, const Joints& acceleration) {
+    const auto share = [&](const Joints& x, double JointLimits::*which) {
+      return x.cwiseQuotient(limits_of(known_, which)).cwiseAbs().maxCoeff();
+    };
+    const Joints lower = limits_of(known_, &JointLimits::lower),
+                 upper = limits_of(known_, &JointLimits::upper);
+    out_.use.include({(2 * robot_.q - lower - upper).cwiseQuotient(upper - lower).cwiseAbs().maxCoeff(),
+                      share(robot_.qd, &JointLimits::velocity),
+                      share(acceleration, &JointLimits::acceleration),
+                      share((acceleration - acceleration_) / kStep, &JointLimits::jerk),
+                      share(torque, &JointLimits::torque)});
+    acceleration_ = acceleration;
   }
 
   void remember(const TaskReference& reference, const ControlStep& control) {
@@ -310,6 +333,7 @@ class Run {
   JointGains joint_gains_;
   std::optional<JointCourse> joint_course_;
   JointReference joint_reference_;
+  Joints acceleration_ = Joints::Zero(7);  ///< of the last step
   Adaptation adaptation_;
   std::optional<AdaptiveController> controller_;
   double release_time_{}, now_{};
@@ -317,6 +341,12 @@ class Run {
 };
 
 }  // namespace
+
+void JointUse::include(const JointUse& other) {
+  for (double JointUse::*one : {&JointUse::position, &JointUse::velocity, &JointUse::acceleration,
+                                &JointUse::jerk, &JointUse::torque})
+    this->*one = std::max(this->*one, other.*one);
+}
 
 Adaptation StudyOptions::default_adaptation() {
   Adaptation a;
@@ -345,7 +375,8 @@ StudyThrow run_throw(const ControllerChoice& choice, const Payload& payload, con
   run.settle();
   for (int k = 0; k < options.repetitions; ++k) run.swing(run.steps_of_course(), record);
   run.swing(run.steps_to_release(), record);
-  return run.let_go();
+  run.let_go();
+  return run.brake();
 }
 
 Dispersion dispersion_of(const std::vector<StudyThrow>& throws) {
@@ -356,7 +387,7 @@ Dispersion dispersion_of(const std::vector<StudyThrow>& throws) {
     ++out.throws;
     out.hits += one.hit;
     out.lost += !one.lands;
-    out.largest_torque_use = std::max(out.largest_torque_use, one.torque_use);
+    out.use.include(one.use);
     if (!one.lands) continue;
     ++landed;
     out.mean += one.miss;

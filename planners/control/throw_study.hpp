@@ -38,16 +38,16 @@ ControllerChoice joint_controller();
 
 /// The motion, the noise and the tolerances of the study.
 struct StudyOptions {
-  Eigen::Vector3d start{0.38, 0, 0.12};                                       ///< tip at rest [m]
-  Eigen::Vector3d release{0.52, 0, 0.30};                                     ///< tip at the release [m]
-  Eigen::Vector3d velocity{1.05, 0, 0.70};                                    ///< there [m/s]
-  double throw_time{0.7}, brake_time{0.2}, return_time{0.9}, hold_time{0.3};  ///< of a repetition [s]
+  Eigen::Vector3d start{-0.23, -0.63, 0.21};                                  ///< tip at rest [m]
+  Eigen::Vector3d release{0, -0.63, 0.30};                                    ///< tip at the release [m]
+  Eigen::Vector3d velocity{1.0, 0, 0.38};                                     ///< there [m/s]
+  double throw_time{0.5}, brake_time{0.4}, return_time{1.5}, hold_time{0.3};  ///< of a repetition [s]
   int repetitions{4};                            ///< without release, before the throw; >= 0
   double landing_height{-0.3};                   ///< [m]
   Eigen::Vector2d box{0.20, 0.20};               ///< lengths along x and y [m]: chosen
   double angle_noise{2e-5};                      ///< 1 σ [rad]
-  double rate_noise{5e-3};                       ///< [rad/s]
-  double torque_noise{0.05};                     ///< [N m]
+  double rate_noise{2e-4};                       ///< [rad/s]
+  double torque_noise{5e-5};                     ///< share of each joint's limit [-]
   double friction_error{0.1};                    ///< 1 σ of each joint's friction against the model's [-]
   double grasp_offset{0.003};                    ///< 1 σ of the object's centre in the hand, per axis [m]
   double release_jitter{0.002};                  ///< 1 σ [s]
@@ -65,13 +65,25 @@ struct TrackingSample {
   double mass_estimate{};                     ///< kg
 };
 
+/// Largest shares of the joints' limits: 1 is at a limit.
+struct JointUse {
+  double position{};      ///< |q − middle| over half the range [-]
+  double velocity{};      ///< [-]
+  double acceleration{};  ///< of the rate's change over a step of the controller [-]
+  double jerk{};          ///< of that change's change [-]
+  double torque{};        ///< that was asked for [-]
+  /// Of each the larger one.
+  void include(const JointUse& other);
+};
+
 /// One run: how it landed, and how the controller did.
 struct StudyThrow {
   Eigen::Vector2d miss{0, 0};  ///< landing − where the reference would land, along and across [m]
   bool hit{}, lands{};         ///< in the box; comes down to the landing height at all
   double release_position_error{}, release_velocity_error{};  ///< m, m/s
   std::vector<double> rms_error;  ///< of the position per repetition, the throw last [m]
-  double torque_use{};            ///< largest share of a joint's torque limit that was asked for
+  JointUse use;  ///< of the simulated joints, at every step, from the object's pick-up to the
+                 ///< end of the brake
   LinkParameters estimate = LinkParameters::Zero();  ///< π̂ at the release
   std::vector<TrackingSample> history;               ///< every 10 ms, if asked for
 };
@@ -87,7 +99,7 @@ struct Dispersion {
   Eigen::Vector2d mean{0, 0};    ///< of the miss, along and across [m]
   Eigen::Vector2d std{0, 0};     ///< of the miss, of a sample (n - 1) [m]
   double rms{};                  ///< √(mean |miss|²): bias and scatter [m]
-  double largest_torque_use{};   ///< share of a joint's limit
+  JointUse use;                  ///< the largest of all runs
 };
 /// Over runs with different seeds.
 Dispersion dispersion_of(const std::vector<StudyThrow>& throws);

@@ -12,7 +12,8 @@
 namespace unhand::planners::flip {
 namespace {
 
-constexpr int kKnot = 4;  ///< control steps between the hand's knots
+constexpr int kKnot = 4;           ///< control steps between the hand's knots
+constexpr double kInPlane = 0.01;  ///< rad: turned by so much, a throw is 5e-5 of its way shorter
 
 struct HandKnot {
   std::array<double, 3> p, v, a;  ///< x, z, θ and their derivatives
@@ -55,13 +56,29 @@ FlipReference reference_at(const FlipMotion& motion, const FlipCommand& u, doubl
 void check_reference(const FlipRobot& robot, const FlipCommand& u) {
   const FlipReference start = reference_at(robot.motion, u, 0),
                       end = reference_at(robot.motion, u, robot.motion.duration);
+  const auto refuse_of = [&](const std::string& name, const char* what, double value, double low,
+                             double high) {
+    throw std::invalid_argument(
+        fmt::format("flip command pitch {:.3f}, speed {:.3f}: {} of {} is {:.3f}; accepted: {:.3f} to {:.3f}",
+                    u.pitch, u.speed, what, name, value, low, high));
+  };
+  for (const FlipReference& at : {start, end}) {
+    const ChainFrames<double> frames = frames_of<double>(robot.chain, at.q);
+    for (int i = 0; i < robot.chain.size(); ++i) {
+      if (robot.motion.rate[i] == 0) continue;
+      const auto k = static_cast<std::size_t>(i);
+      const Eigen::Vector3d axis = frames.links[k].R.col(2);
+      if (const double off = std::atan2(std::hypot(axis.x(), axis.z()), std::abs(axis.y())); off > kInPlane)
+        refuse_of(robot.chain.joints[k].name, "angle [rad] from y to the axis", off, 0, kInPlane);
+    }
+    if (const double off = std::asin(std::min(1.0, std::abs(frames.tip.R(1, 2)))); off > kInPlane)
+      refuse_of("the hand", "angle [rad] to the plane of x and z", off, 0, kInPlane);
+  }
   for (int i = 0; i < robot.chain.size(); ++i) {
     const Joint& joint = robot.chain.joints[static_cast<std::size_t>(i)];
     const JointLimits& l = joint.limits;
     const auto refuse = [&](const char* what, double value, double low, double high) {
-      throw std::invalid_argument(fmt::format(
-          "flip command pitch {:.3f}, speed {:.3f}: {} of {} is {:.3f}; accepted: {:.3f} to {:.3f}", u.pitch,
-          u.speed, what, joint.name, value, low, high));
+      refuse_of(joint.name, what, value, low, high);
     };
     for (const double q : {start.q[i], end.q[i]})  // monotonous in between
       if (q < l.lower || q > l.upper) refuse("position [rad]", q, l.lower, l.upper);

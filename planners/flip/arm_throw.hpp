@@ -35,7 +35,8 @@ FlipReference reference_at(const FlipMotion& motion, const FlipCommand& u, doubl
 Joints throwing_pose(const FlipMotion& motion, const FlipCommand& u);
 
 /// Throws std::invalid_argument, naming joint and limit, where the reference of a command leaves the joints'
-/// limits of position, velocity or acceleration.
+/// limits of position, velocity or acceleration, and where it leaves the vertical plane of x and z: the axes
+/// of the joints that throw may be 0.01 rad off y, and the hand as much off the plane.
 void check_reference(const FlipRobot& robot, const FlipCommand& u);
 
 /// How finely the arm is integrated.

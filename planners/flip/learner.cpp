@@ -189,6 +189,7 @@ DetachVector shifted(const DetachVector& d, double shift) {
 }
 
 std::vector<FlipDatum> transferred(std::span<const FlipDatum> data, double shift) {
+  if (shift == 0) return {data.begin(), data.end()};
   std::vector<FlipDatum> out;
   for (FlipDatum one : data) {
     one.detach = shifted(one.detach, shift);

@@ -81,7 +81,8 @@ class ConeLearner final : public FlipLearner {
 /// (q^o, v^o) of a bar whose centre of mass lies Δh [m] further from the pads, the twist of the bar
 /// unchanged.
 DetachVector shifted(const DetachVector& detach, double shift);
-/// The data as they would be with the centre of mass shifted; those that then never land are left out.
+/// The data as they would be with the centre of mass shifted: landings are those of the flights from the
+/// shifted detach states, and data that then never land are left out. Without a shift, they are as measured.
 std::vector<FlipDatum> transferred(std::span<const FlipDatum> data, double shift);
 
 /// Model 3: transfer under a shift of the centre of mass, three opening iterations, then model 2 on their

@@ -122,7 +122,8 @@ std::string complaint_of(const Bar& bar);
 
 /// "panda-flip", or a TOML file with the same keys; all but `source`, `notes` and what the pads' law takes of
 /// its own are required. `arm` is as for read_chain, a file's name relative to the TOML file. Throws
-/// datasets::TomlError, also where the reference of a command would leave the joints' limits.
+/// datasets::TomlError, also where the reference of a command would leave the joints' limits or the vertical
+/// plane of x and z.
 FlipRobot read_flip_robot(const std::string& name_or_file);
 
 /// The chain with the bar held rigidly along the tip's z axis: a thin rod's inertia across it.

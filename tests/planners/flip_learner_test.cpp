@@ -174,6 +174,19 @@ TEST(Transfer, ShiftIsARigidBodys) {
   EXPECT_NEAR(moved[4] - d[4], d[5] * h * std::sin(hanging), 1e-14);
 }
 
+// A bar that is the same lands where it was seen to, not where its measured detach would bring it.
+TEST(Transfer, WithoutAShiftDataAreAsMeasured) {
+  const FlipDatum seen{{0.1, 0.8, 50}, {0.7, 0.5, 0.4, 1.0, 1.2, 7.0}, {1.1, 3.1}, 3};
+  const std::vector<FlipDatum> same = transferred(std::array{seen}, 0),
+                               moved = transferred(std::array{seen}, 1e-6);
+  ASSERT_EQ(same.size(), 1u);
+  ASSERT_EQ(moved.size(), 1u);
+  EXPECT_EQ(same[0].landing.x, seen.landing.x);
+  EXPECT_EQ(same[0].landing.angle, seen.landing.angle);
+  EXPECT_NEAR(moved[0].landing.x, fly_flip(seen.detach)->x, 1e-5);
+  EXPECT_GT(std::abs(moved[0].landing.x - seen.landing.x), 0.01);
+}
+
 TEST(Transfer, IsExactInItsFirstTwoIterationsWhereItsAssumptionHolds) {
   const LinearPlant old{false, 0.0}, now{false, 0.06};
   const auto past = gather(old, "population", population_grid(kRange), 1, kBar).data;

@@ -312,6 +312,14 @@ TEST(FlipRobotFile, TellsWhatIsWrong) {
   expect_refused("speed = [0.62, 0.97]", "speed = [0.62, 1.9]", "panda_joint");
   EXPECT_NO_THROW(read_with("arm = \"panda\"", "arm = \"panda\""));
   expect_refused("pads = 2", "pads = 2\nkappa = 1", "is of limit_surface_quartic");
+  // Throws that leave the plane of x and z; rounding of a turn does not.
+  expect_refused("pose_rad = [0, 0.375", "pose_rad = [0.7, 0.375",
+                 "angle [rad] from y to the axis of panda_joint2 is 0.700; accepted: 0.000 to 0.010");
+  expect_refused("pose_rad = [0, 0.375", "pose_rad = [0.02, 0.375", "panda_joint2 is 0.020");
+  expect_refused("rate_rad_s = [0, -1.35", "rate_rad_s = [0.3, -1.35", "axis of panda_joint1 is 1.571");
+  expect_refused("pose_rad = [0, 0.375, 0, -2.12, 0, 3.2", "pose_rad = [0, 0.375, 0, -2.12, 0.3, 3.2",
+                 "axis of panda_joint6");
+  EXPECT_NO_THROW(read_with("pose_rad = [0, 0.375", "pose_rad = [0.005, 0.375"));
   // Arms of seven joints that move, but not by torques.
   const auto arm = scratch.path() / "seven.toml";
   for (const auto& [joint, why] :
