@@ -84,8 +84,7 @@ std::string why_none_lands(const fl::HandLibrary& library) {
   return fmt::format(
       "{} of {} let it go within window_s = {:g} s after the brake's start, but it never comes down to "
       "height 0; before, it slips {:.2g} to {:.2g} m through the pads, whose friction is {:.3g} N at most "
-      "against "
-      "its weight of {:.3g} N",
+      "against its weight of {:.3g} N",
       free, library.commands().size(), robot.motion.window, least, most,
       robot.pads.count * robot.pads.mu * robot.gripper.grip_force,
       -planners::kGravity.z() * library.bar().mass);
