@@ -218,8 +218,7 @@ std::string why_no_rest(const Chain& chain, const JointVector<double>& home) {
   if (lowest > 0) return "";
   return fmt::format(
       "at rest at ({}) deg the arm's lowest joint or what it throws is at {:.3f} m; accepted: above its "
-      "base, "
-      "> 0 m",
+      "base, > 0 m",
       pose, lowest);
 }
 
