@@ -526,7 +526,9 @@ TEST_F(Cli, ElasticThrowsThatNoRunConfirmsAreNoAnswer) {
       "plan elastic --target 2.2 --longest 10 --starts 1 --intervals 4 --nodes 4 --checks 2 --json t.json");
   EXPECT_EQ(table.code, 1);
   EXPECT_THAT(table.err, HasSubstr("no node of the table is confirmed by its run"));
-  for (const json& node : read_json(folder / "t.json")["nodes"]) EXPECT_FALSE(node["confirmed"]);
+  json written = read_json(folder / "t.json");
+  ASSERT_FALSE(written["nodes"].empty());
+  for (const json& node : written["nodes"]) EXPECT_FALSE(node["confirmed"]);
 }
 
 TEST_F(Cli, AnElasticWristThrowsFaster) {
