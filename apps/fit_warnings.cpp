@@ -19,13 +19,13 @@ bool is_wrench(Channel channel) {
   return channel == Channel::wrench_fx || channel == Channel::wrench_fz || channel == Channel::wrench_tau;
 }
 
-/// Whether a wild misfit is none without the throw that errs most.
-bool of_one(const fitting::ChannelMisfit& m) { return m.without_worst().chi2_per_sample() < kPoorFit; }
-
 /// Whether each channel but for the throw that errs most in it leaves a good fit.
 bool is_of_single_throws(const fitting::FitResult& fit) {
   double chi2 = 0, n = 0;
-  for (const auto& m : fit.misfit) chi2 += m.without_worst().chi2, n += m.without_worst().n;
+  for (const auto& m : fit.misfit) {
+    const auto rest = m.without_worst();
+    chi2 += rest.chi2, n += rest.n;
+  }
   return chi2 < kPoorFit * n;
 }
 
@@ -42,13 +42,14 @@ std::vector<std::string> fit_warnings(const FitAnswer& a, const FitRequest& requ
         left_out.size(), request.model, fmt::join(left_out, ", ")));
   if (a.fit.outcome == fitting::FitOutcome::iterations_spent)
     out.push_back("the fit stopped before it had converged: " + a.fit.message);
-  for (const auto& m : a.fit.misfit)
-    if (m.chi2_per_sample() > kWildMisfit)
-      out.push_back(fmt::format(
-          "{} ({}) is off by {:.0f} sigma{}: it hardly counts in the fit. {}", to_string(m.channel),
-          to_string(m.phase), std::sqrt(m.chi2_per_sample()),
-          of_one(m) ? ", nearly all of it in one throw" : "",
-          of_one(m) ? "A reading that went wrong?" : "Another unit, clock or frame, or not this model?"));
+  for (const auto& m : a.fit.misfit) {
+    if (!(m.chi2_per_sample() > kWildMisfit)) continue;
+    const bool of_one = m.without_worst().chi2_per_sample() < kPoorFit;
+    out.push_back(fmt::format(
+        "{} ({}) is off by {:.0f} sigma{}: it hardly counts in the fit. {}", to_string(m.channel),
+        to_string(m.phase), std::sqrt(m.chi2_per_sample()), of_one ? ", nearly all of it in one throw" : "",
+        of_one ? "A reading that went wrong?" : "Another unit, clock or frame, or not this model?"));
+  }
   if (const auto chi2 = a.fit.chi2_per_dof(); chi2 && *chi2 > kPoorFit && !is_of_single_throws(a.fit))
     out.push_back(fmt::format(
         "chi2 per degree of freedom is {:.3g}: something is missing in {} or wrong in the log, and "
