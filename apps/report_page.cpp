@@ -23,6 +23,17 @@ std::string base64(const std::filesystem::path& file) {
   return out;
 }
 
+// On paper the widest table, of ten columns, has 18 cm, and no row or figure is cut by the end of a page.
+constexpr const char* kStyle =
+    "body{font:15px/1.45 sans-serif;max-width:60em;margin:2em auto;padding:0 1em}"
+    "table{border-collapse:collapse;margin:1em 0;font-size:13px}"
+    "td,th{padding:.15em .7em;border-bottom:1px solid #ddd;text-align:left}"
+    ".n{text-align:right}td.n{white-space:nowrap;font-variant-numeric:tabular-nums}"
+    "img{max-width:100%}code{background:#f3f3f3;padding:.1em .3em}"
+    "@page{margin:15mm}"
+    "@media print{body{font-size:9.5pt;max-width:none;margin:0;padding:0}table{font-size:7.5pt}"
+    "td,th{padding:.1em .4em}tr,img{break-inside:avoid}h2,h3{break-after:avoid}}";
+
 }  // namespace
 
 std::string escaped(const std::string& text) {
@@ -33,15 +44,18 @@ std::string escaped(const std::string& text) {
 }
 
 std::string html(const Table& table) {
-  std::string out = "<table><tr>";
-  for (const auto& cell : table.header) out += "<th>" + escaped(cell) + "</th>";
+  const auto kind = [&](std::size_t i) { return static_cast<int>(i) < table.left ? "" : " class=n"; };
+  std::string out = "<table><thead><tr>";
+  for (std::size_t i = 0; i < table.header.size(); ++i)
+    out += fmt::format("<th{}>{}</th>", kind(i), escaped(table.header[i]));
+  out += "</tr></thead><tbody>";
   for (const auto& row : table.rows) {
-    out += "</tr><tr>";
+    out += "<tr>";
     for (std::size_t i = 0; i < row.size(); ++i)
-      out +=
-          fmt::format("<td{}>{}</td>", static_cast<int>(i) < table.left ? "" : " class=n", escaped(row[i]));
+      out += fmt::format("<td{}>{}</td>", kind(i), escaped(row[i]));
+    out += "</tr>";
   }
-  return out + "</tr></table>\n";
+  return out + "</tbody></table>\n";
 }
 
 std::string html_picture(const std::filesystem::path& png, const std::string& alt) {
@@ -51,12 +65,8 @@ std::string html_picture(const std::filesystem::path& png, const std::string& al
 std::string html_page(const std::string& title, const std::string& body) {
   return fmt::format(
       "<!DOCTYPE html><html lang=en><meta charset=utf-8><title>{0}</title>\n"
-      "<style>body{{font:15px/1.45 sans-serif;max-width:60em;margin:2em auto;padding:0 1em}}"
-      "table{{border-collapse:collapse;margin:1em 0;font-size:13px}}td,th{{padding:.15em .7em;"
-      "border-bottom:1px solid "
-      "#ddd;text-align:left}}td.n{{text-align:right;white-space:nowrap;font-variant-numeric:tabular-nums}}"
-      "img{{max-width:100%}}code{{background:#f3f3f3;padding:.1em .3em}}</style>\n<h1>{0}</h1>\n{1}</html>\n",
-      escaped(title), body);
+      "<style>{1}</style>\n<h1>{0}</h1>\n{2}</html>\n",
+      escaped(title), kStyle, body);
 }
 
 }  // namespace unhand::apps
