@@ -151,10 +151,13 @@ std::string why_imitation(const AcceptedEffect& effect, const Stage& stage, cons
 
 namespace {
 
-/// Whether a channel is noisier in `now` than in `before`, beyond chance.
+/// Whether a channel is noisier in `now` than in `before`, beyond chance. Of a landing there is one reading,
+/// which a throw's own unknowns may take up, the more so the wider they scatter for want of the effect: below
+/// its noise it says how much they do, and no more.
 bool is_noisier(const ChannelMisfit& now, const std::vector<ChannelMisfit>& before) {
-  const double chance = 3 * std::sqrt(2.0 / now.n);
-  return now.chi2_per_sample() > (1 + std::max(kNoisier, chance)) * misfit_in(before, now.channel, now.phase);
+  const double chance = 3 * std::sqrt(2.0 / now.n), least = now.phase == Phase::landing ? 1 : 0;
+  return now.chi2_per_sample() >
+         (1 + std::max(kNoisier, chance)) * std::max(least, misfit_in(before, now.channel, now.phase));
 }
 
 }  // namespace
