@@ -66,14 +66,15 @@ Figure missing_acceleration_figure(const fitting::MissingAcceleration& missing) 
     for (std::size_t j = 0; j < component.at.size(); ++j)
       block.rows.push_back({component.at[j], component.value[j], 2 * component.sigma[j]});
     figure.data.push_back(std::move(block));
+    const auto [first, last] = std::minmax_element(component.at.begin(), component.at.end());
     const double left = 2.0 + room * (at % columns), bottom = 1.6 + height * (rows - 1 - at / columns);
     script += place(figure, {left, left + room - 1.4, bottom, bottom + 3.6});
     script += fmt::format(
         "set title 'along {}' offset 0,-0.6\nset xlabel '{}' offset 0,0.3\nset ylabel '{}' offset 0.5\n"
-        "set format y '%.3g'\nplot 0 with lines linecolor rgb '#808080', "
+        "set format y '%.3g'\nset xtics {:.6g}\nplot 0 with lines linecolor rgb '#808080', "
         "DATA index {} using 1:2:3 with yerrorlines pointtype 7 pointsize 0.6 linecolor rgb '#0072b2'\n",
         plain(component.name()), missing.against, at % columns == 0 ? "a [m/s^2], with 2 {/Symbol s}" : "",
-        at);
+        component.at.empty() ? 1 : tic_step(*last - *first), at);
     ++at;
   }
   figure.script = script + "unset multiplot\n";

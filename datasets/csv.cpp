@@ -94,6 +94,9 @@ double CsvLine::real(std::size_t i, std::string_view column) const {
 
 int CsvLine::integer(std::size_t i, std::string_view column) const {
   int value = 0;
+  double real = 0;
+  const bool whole = parse_real(*this, i, real) && real == std::floor(real) && std::abs(real) < 1e9;
+  if (whole) return static_cast<int>(real);
   if (!parse(cells[i], value)) fail(column, fmt::format("'{}' is not an integer", shown(cells[i])));
   return value;
 }

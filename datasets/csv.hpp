@@ -25,6 +25,7 @@ struct CsvLine {
   /// The number in cell i, finite. `column` names it in errors. Where cells are not separated by commas, a
   /// decimal comma is a decimal point. Throws ImportError.
   double real(std::size_t i, std::string_view column) const;
+  /// A whole number; 3.0 is one, too.
   int integer(std::size_t i, std::string_view column) const;
   bool is_number(std::size_t i) const;
 

@@ -8,6 +8,7 @@
 #include <span>
 #include <stdexcept>
 #include <string_view>
+#include <utility>
 
 #include "datasets/channel_rules.hpp"
 #include "datasets/channel_table.hpp"
@@ -61,6 +62,16 @@ TossColumns toss_columns_of(const CsvLine& line) {
   return out;
 }
 
+/// 0 or 1, also as False or True, which is what a table of truth values is written as.
+bool flag_in(const CsvLine& line, std::size_t i, std::string_view name) {
+  for (const auto& [word, flag] :
+       {std::pair{"True", true}, {"true", true}, {"False", false}, {"false", false}})
+    if (line.cells[i] == word) return flag;
+  const int flag = line.integer(i, name);
+  if (flag != 0 && flag != 1) line.fail(name, fmt::format("{} is not 0 or 1", flag));
+  return flag == 1;
+}
+
 Row parse_row(const CsvLine& line, const TossColumns& columns) {
   line.expect_cells(columns.width);
   const auto integer = [&](std::size_t j) {
@@ -72,9 +83,7 @@ Row parse_row(const CsvLine& line, const TossColumns& columns) {
   row.t = line.real(columns.index[2], "t_s");
   for (std::size_t j = 0; j < 7; ++j)
     row.pose[j] = line.real(columns.index[3 + j], part_of(toss_columns, 3 + j));
-  const int flag = integer(10);
-  if (flag != 0 && flag != 1) line.fail("before_first_contact", fmt::format("{} is not 0 or 1", flag));
-  row.before_contact = flag == 1;
+  row.before_contact = flag_in(line, columns.index[10], part_of(toss_columns, 10));
   if (row.toss < 0) line.fail("toss", fmt::format("{} is negative", row.toss));
   double norm = 0;
   for (std::size_t j = 3; j < 7; ++j) norm += row.pose[j] * row.pose[j];

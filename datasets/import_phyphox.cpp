@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <optional>
 #include <stdexcept>
+#include <string_view>
 #include <utility>
 
 #include "datasets/csv.hpp"
@@ -32,26 +33,43 @@ struct ExportColumns {
   std::optional<std::size_t> absolute;
 };
 
+/// As phyphox writes its units.
+std::string with_caret(std::string cell) {
+  constexpr std::string_view square = "²";
+  if (const auto at = cell.find(square); at != std::string::npos) cell.replace(at, square.size(), "^2");
+  return cell;
+}
+
 ExportColumns columns_of(const CsvLine& line) {
   ExportColumns out;
   out.width = line.cells.size();
-  for (const std::string& cell : line.cells)
+  std::vector<std::string> cells;
+  for (const std::string& cell : line.cells) cells.push_back(with_caret(cell));
+  constexpr const char* kNoGravity = "has gravity taken out by the phone: record 'Acceleration (with g)'";
+  for (const std::string& cell : cells)
     if (cell.starts_with("Linear Acceleration") || cell.starts_with("Linear acceleration"))
-      line.fail(cell, "has gravity taken out by the phone: record 'Acceleration (with g)'");
+      line.fail(cell, kNoGravity);
+  const auto has = [&](const std::string& name) {
+    return std::find(cells.begin(), cells.end(), name) != cells.end();
+  };
   const auto need = [&](const std::string& name) {
-    const auto found = std::find(line.cells.begin(), line.cells.end(), name);
-    if (found != line.cells.end()) return static_cast<std::size_t>(found - line.cells.begin());
+    const auto found = std::find(cells.begin(), cells.end(), name);
+    if (found != cells.end()) return static_cast<std::size_t>(found - cells.begin());
     line.fail("", unknown_name(fmt::format("there is no column '{}'", name), name, line.cells));
   };
   out.time = need("Time (s)");
   out.names[0] = "Time (s)";
+  // An experiment of the user's own has a file per sensor, which alone says what X, Y and Z are of.
+  const bool by_axis = has("X (m/s^2)") && !has("Acceleration x (m/s^2)");
+  if (by_axis && std::filesystem::path(line.file).stem().string().starts_with("Linear"))
+    line.fail("X (m/s^2)", kNoGravity);
   for (std::size_t j = 0; j < 3; ++j) {
-    out.names[1 + j] = fmt::format("Acceleration {} (m/s^2)", "xyz"[j]);
+    out.names[1 + j] =
+        by_axis ? fmt::format("{} (m/s^2)", "XYZ"[j]) : fmt::format("Acceleration {} (m/s^2)", "xyz"[j]);
     out.force[j] = need(out.names[1 + j]);
     out.names[4 + j] = fmt::format("Gyroscope {} (rad/s)", "xyz"[j]);
   }
-  if (std::find(line.cells.begin(), line.cells.end(), out.names[4]) != line.cells.end())
-    out.rate = {need(out.names[4]), need(out.names[5]), need(out.names[6])};
+  if (has(out.names[4])) out.rate = {need(out.names[4]), need(out.names[5]), need(out.names[6])};
   return out;
 }
 

@@ -42,9 +42,11 @@ struct PhyphoxRecording {
 
 /// Reads time and specific force [m/s²] in the phone's frame, and its angular rate where the file has it
 /// ("Gyroscope x (rad/s)"). Columns are separated by commas, semicolons or tabs, with a header in phyphox's
-/// English words; a file without one holds time, x, y, z and perhaps the absolute value. The noise declared
-/// is estimated from the third differences of each axis over the falls. "Linear acceleration", from which the
-/// phone has taken what it believes gravity to be, is refused, and so are samples further apart than 0.1 s or
+/// English words, where m/s² may stand for m/s^2 and, as in the file that an experiment of the user's own has
+/// per sensor, "X (m/s^2)" for "Acceleration x (m/s^2)"; a file without one holds time, x, y, z and perhaps
+/// the absolute value. The noise declared is estimated from the third differences of each axis over the
+/// falls. "Linear acceleration" (in the header, or of X, Y and Z in the file's name), from which the phone
+/// has taken what it believes gravity to be, is refused, and so are samples further apart than 0.1 s or
 /// closer than 0.1 ms (times in ms), and a median specific force that is, to 5 %, gravity in g (of all
 /// samples) or in ft/s² (PhyphoxRecording::rest). Throws ImportError naming file, line and
 /// column; a recording without a fall is not an error.

@@ -22,6 +22,7 @@ using flight::Vec3;
 namespace {
 
 constexpr double kTurningRate = 0.5;  // [rad/s] that an object let go by hand may turn with
+constexpr const char* kLeverArm = "sensor.lever_arm";
 
 /// A series at one time, by the parabola through it, and the variance of that in units of a sample's.
 struct Smoothed {
@@ -72,7 +73,7 @@ FallProblem::FallProblem(const datasets::ThrowLog& log, Zeros zeros) : gravity_(
     if (const std::string why = add(one, splits[n], axes, counts); !why.empty())
       skipped_.push_back({one.id, why});
   }
-  if (zeros == Zeros::own) free_zeros();
+  if (zeros == Zeros::own) free_zeros({}, {});
   for (const auto& [what, times] : counts.left_out)
     notes_.push_back(fmt::format("{}: left out of {} falls", what, times));
   for (const auto& [object, of] : counts.coarse)
@@ -85,6 +86,18 @@ FallProblem::FallProblem(const datasets::ThrowLog& log, Zeros zeros) : gravity_(
   if (groups_.empty())
     throw std::invalid_argument("falls: no throw is one" +
                                 (skipped_.empty() ? "" : ": " + skipped_.front().second));
+}
+
+FallProblem::FallProblem(const datasets::ThrowLog& log, const GroupedFit& fit)
+    : FallProblem(log, Zeros::shared) {
+  std::vector<std::string> names;
+  std::vector<double> values;
+  for (std::size_t k = 0; k < fit.shared.size(); ++k)
+    if (fit.shared[k].effect == kLeverArm) {
+      names.push_back(fit.shared[k].name);
+      values.push_back(fit.values[static_cast<Eigen::Index>(k)]);
+    }
+  free_zeros(names, values);
 }
 
 std::string FallProblem::add(const datasets::Throw& one, datasets::Split split, const ForceAxes& axes,
@@ -123,8 +136,11 @@ std::string FallProblem::add(const datasets::Throw& one, datasets::Split split, 
   return {};
 }
 
-void FallProblem::free_zeros() {
-  for (const std::string& object : objects_of(*this))
+void FallProblem::free_zeros(std::span<const std::string> names, std::span<const double> values) {
+  for (const std::string& object : objects_of(*this)) {
+    const OwnNames mine(names, object);
+    const std::vector<double> shared = mine.values(values);
+    const dynamics::Values<double> given(mine.names, shared);
     for (std::size_t a = 0; a < 3; ++a) {
       std::vector<double> zeros, variances;
       std::vector<Fall*> of;
@@ -134,7 +150,13 @@ void FallProblem::free_zeros() {
             std::find(fall.axes.begin(), fall.axes.end(), a) == fall.axes.end())
           continue;
         const double still = std::clamp(fall.before.speed / gravity_, 0.0, fall.readings.samples.time.back());
-        const Smoothed zero = smoothed_at(fall.readings.samples.time, fall.readings.force, a, still);
+        std::vector<Vec3<double>> force = fall.readings.force;
+        if (!names.empty()) {
+          const auto turned = experiment::falling_readings<double>(started(fall, given, groups_[i].start),
+                                                                   fall.readings.samples, gravity_, given);
+          for (std::size_t n = 0; n < force.size(); ++n) force[n] = flight::difference(force[n], turned[n]);
+        }
+        const Smoothed zero = smoothed_at(fall.readings.samples.time, force, a, still);
         zeros.push_back(zero.value), variances.push_back(zero.variance * fall.sigma[a] * fall.sigma[a]);
         of.push_back(&fall);
       }
@@ -150,6 +172,7 @@ void FallProblem::free_zeros() {
                         "from recording to recording; the mean of a fall counts by so much less",
                         channels_[a], object, differ));
     }
+  }
 }
 
 Eigen::VectorXd FallProblem::left_of(std::size_t group, const Eigen::VectorXd& residual) const {

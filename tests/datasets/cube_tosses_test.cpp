@@ -130,6 +130,20 @@ TEST(CubeTosses, ReadsColumnsByName) {
                    return Cells{c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8], c[9], c[16]};
                  }),
             expected);
+  // As a table of reals, or of truth values, is written.
+  EXPECT_EQ(read("toss,k,t_s,x_m,y_m,z_m,qw,qx,qy,qz,before_first_contact", ",",
+                 [](const Cells& c) {
+                   return Cells{c[0] + ".0", c[1] + ".000e+00", c[2], c[3], c[4], c[5], c[6], c[7], c[8],
+                                c[9],        c[16] + ".00"};
+                 }),
+            expected);
+  EXPECT_EQ(
+      read("toss,k,t_s,x_m,y_m,z_m,qw,qx,qy,qz,before_first_contact", ",",
+           [](const Cells& c) {
+             return Cells{
+                 c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8], c[9], c[16] == "1" ? "True" : "False"};
+           }),
+      expected);
 }
 
 // Half the space diagonal: with the centre above it, no orientation touches the table.

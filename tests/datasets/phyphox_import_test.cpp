@@ -119,6 +119,23 @@ TEST(Phyphox, WaysToWriteIt) {
   EXPECT_EQ(read(script.rows('\t')).falls, commas.falls);  // without a header
 }
 
+// An experiment of the user's own exports a file per sensor, and names the axes alone: of the file "Linear
+// Accelerometer.csv" as well.
+TEST(Phyphox, OtherNamesOfTheSameColumns) {
+  const std::string rows = Script{{{1, 1.6}}}.rows();
+  const auto usual = read(header + rows);
+  std::string square = header;
+  for (std::size_t at; (at = square.find("s^2")) != std::string::npos;) square.replace(at, 3, "s²");
+  EXPECT_EQ(read(square + rows).falls, usual.falls);
+  const std::string by_axis = "\"Time (s)\",\"X (m/s^2)\",\"Y (m/s^2)\",\"Z (m/s^2)\"\n";
+  EXPECT_EQ(read(by_axis + rows).falls, usual.falls);
+  const Scratch scratch;
+  const auto linear = scratch / "Linear Accelerometer.csv";
+  put_bytes(linear, by_axis + rows);
+  expect_error<ImportError>([&] { read_phyphox(linear); }, linear, "line 1, column X (m/s^2)",
+                            "has gravity taken out by the phone");
+}
+
 TEST(Phyphox, AngularRateWhereThereIsOne) {
   std::string text =
       "Time (s),Acceleration x (m/s^2),Acceleration y (m/s^2),Acceleration z (m/s^2),Absolute acceleration "

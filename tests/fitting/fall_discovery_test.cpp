@@ -263,6 +263,49 @@ TEST(FallDiscovery, AFallHasAZeroOfItsOwn) {
   }
 }
 
+/// Falls that turn, each steadily: as a gyroscope with some noise sees it, and a sensor off the CoM feels it.
+void turn_steadily(datasets::ThrowLog& log, const flight::Vec3<double>& arm, unsigned seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  for (auto& one : log.throws) {
+    auto& imu = *one.imu;
+    // About an axis near the plane of the screen, as phones that are let go turn; up to some 4 rad/s.
+    const flight::Vec3<double> axis{normal(random), normal(random), 0.3 * normal(random)};
+    const auto omega = flight::scaled(2 * normal(random) / flight::norm(axis), axis);
+    const auto felt = flight::cross(omega, flight::cross(omega, arm));
+    imu.angular_rate.rows = imu.time.rows, imu.angular_rate.cols = 3;
+    imu.angular_rate.data.assign(3 * imu.time.rows, 0);
+    for (std::size_t i = 0; i < imu.time.rows; ++i) {
+      const double t = imu.time(i) - one.free_flight->first;
+      if (t < 0 || imu.time(i) > one.free_flight->second) continue;
+      const flight::Vec3<double> force{imu.specific_force(i, 0), imu.specific_force(i, 1),
+                                       imu.specific_force(i, 2)};
+      const auto reads = flight::sum(flight::rotate(flight::exp(flight::scaled(-t, omega)), force), felt);
+      for (std::size_t a = 0; a < 3; ++a)
+        imu.angular_rate(i, a) = omega[a] + 0.002 * normal(random), imu.specific_force(i, a) = reads[a];
+    }
+  }
+}
+
+// A steady turn adds a constant, as a zero does. Where a gyroscope saw the turns it is the lever arm's.
+TEST(FallDiscovery, WhatALeverArmMakesOfTurnsThatWereSeenIsNoZero) {
+  const flight::Vec3<double> arm{0.03, 0.04, 0};
+  for (const unsigned seed : {81U, 83U}) {
+    auto log = falls({.drag = 0.04}, 40, seed);
+    turn_steadily(log, arm, seed);
+    const auto found = discover_falls(log, {});
+    const auto *lever = named(found, "sensor.lever_arm"), *drag = named(found, "flight.quadratic_drag");
+    EXPECT_EQ(found.effects.size(), 2U) << seed;
+    ASSERT_TRUE(lever != nullptr && drag != nullptr) << seed;
+    EXPECT_NEAR(value_of(*drag, "k[phone]"), 0.04, 0.0015);
+    // The gyroscope's noise, differentiated, makes the arm look up to a tenth shorter.
+    for (std::size_t a = 0; a < 3; ++a)
+      EXPECT_NEAR(value_of(*lever, std::string(1, "xyz"[a])), arm[a], 0.004) << seed;
+    for (const auto& e : found.evidence)
+      EXPECT_EQ(e.text.find("only a gyroscope could say"), std::string::npos) << e.text;
+  }
+}
+
 // A decay of two seconds is a bias for a fall of 0.6 s: an effect whose shape has become open is another one.
 TEST(FallDiscovery, ABiasIsNoDecayWithoutEnd) {
   const Truth truth{.bias_x = -0.34, .bias_y = -0.24, .bias_z = 0.77, .drag = 0.0436};
