@@ -94,11 +94,11 @@ double CsvLine::real(std::size_t i, std::string_view column) const {
 
 int CsvLine::integer(std::size_t i, std::string_view column) const {
   int value = 0;
+  if (parse(cells[i], value)) return value;
   double real = 0;
-  const bool whole = parse_real(*this, i, real) && real == std::floor(real) && std::abs(real) < 1e9;
-  if (whole) return static_cast<int>(real);
-  if (!parse(cells[i], value)) fail(column, fmt::format("'{}' is not an integer", shown(cells[i])));
-  return value;
+  if (parse_real(*this, i, real) && real == std::floor(real) && std::abs(real) < 1e9)
+    return static_cast<int>(real);
+  fail(column, fmt::format("'{}' is not an integer", shown(cells[i])));
 }
 
 bool CsvLine::is_number(std::size_t i) const {
