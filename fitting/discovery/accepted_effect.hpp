@@ -52,7 +52,7 @@ struct AcceptedEffect {
 /// Terms that describe tracked flights, and where they do so better than accepted effects of the air.
 struct AskedForm {
   std::vector<std::string> outdone;  ///< effects none of whose own forms is among the terms
-  std::string words;                 ///< the terms with their sizes, of each object
+  std::string words;                 ///< the terms with their sizes, of each object; empty: none
   bool unlisted{};                   ///< a term is no accepted effect's own form
   /// Accepted effects whose own forms are among the terms: they act, whatever acts beside them.
   std::vector<std::string> backed;

@@ -48,29 +48,87 @@ std::size_t unknowns_of(const FitResult& fit, const std::vector<std::string>& id
   }));
 }
 
+Rest left_by(const MissingCandidate& by, const PhaseTraces& in) { return rest_around(in.all, by, in.how); }
+
+/// Tracked flights as some accepted effects leave them, and as they are without these.
+class Flights {
+ public:
+  Flights(const Stage& stage, const Stage& less, const DiscoverOptions& options)
+      : train_(traces(less, less.fit, options)),
+        held_out_(traces(less, less.held_out, options)),
+        effects_(left_by({}, traces(stage, stage.fit, options))),
+        effects_held_out_(left_by({}, traces(stage, stage.held_out, options))),
+        misfit_(leaves_flights(stage, options)) {}
+
+  /// Of the train throws, without the effects.
+  const PhaseTraces& train() const { return train_; }
+  /// What the effects leave there.
+  const Rest& effects() const { return effects_; }
+  /// Whether the effects leave a misfit.
+  bool misfit() const { return misfit_; }
+
+  /// Whether a form, of so many unknowns more, describes them better than the effects.
+  bool outdone_by(const MissingCandidate& by, double more) const {
+    const Rest form = left_by(by, train_), form_held_out = left_by(by, held_out_);
+    const double bic = more * std::log(static_cast<double>(std::max(2L, form.degrees_of_freedom))) -
+                       likelier(effects_, form);
+    if (!(bic <= kDeltaBic) || !(likelier(effects_held_out_, form_held_out) > 2 * std::log(kTimesAsLikely)))
+      return false;
+    // Beside a misfit that a form lowers by little, the effects may be true, and something acts beside them.
+    const auto halves = [](const Rest& by_form, const Rest& by_effects) {
+      return beyond_noise(by_form) < kOutdone * beyond_noise(by_effects);
+    };
+    return !misfit_ || (halves(form, effects_) && halves(form_held_out, effects_held_out_));
+  }
+
+ private:
+  static PhaseTraces traces(const Stage& of, const FitResult& half, const DiscoverOptions& options) {
+    return traces_of(of.problem, half, Phase::flight, options.fit.threads);
+  }
+  PhaseTraces train_, held_out_;
+  Rest effects_, effects_held_out_;
+  bool misfit_;
+};
+
+/// The accepted effects of which `which` holds.
+template <class Which>
+std::vector<std::string> ids_of(const Discovery& so_far, const Which& which) {
+  std::vector<std::string> out;
+  for (const AcceptedEffect& effect : so_far.effects)
+    if (which(effect)) out.push_back(effect.id);
+  return out;
+}
+
+/// Accepted effects that give flights an acceleration which these do not have.
+std::vector<std::string> without_need(const Stage& stage, const Discovery& so_far,
+                                      const DiscoverOptions& options) {
+  auto bending = ids_of(so_far, [](const AcceptedEffect& effect) {
+    return bends_flights(effect) ||
+           (!is_law(effect.id) && find_effect(effect.id).form != dynamics::AccelerationForm::none);
+  });
+  if (bending.empty()) return {};
+  const Stage& less = without(stage, bending, options);
+  if (!less.solved()) return {};
+  const Flights flights(stage, less, options);
+  if (!flights.misfit() || !flights.outdone_by({}, 0)) bending.clear();
+  return bending;
+}
+
 }  // namespace
 
 AskedForm form_asked_for(const Stage& stage, const Discovery& so_far, const DiscoverOptions& options) {
   AskedForm out;
-  std::vector<std::string> accepted;
-  for (const AcceptedEffect& effect : so_far.effects)
-    if (bends_flights(effect)) accepted.push_back(effect.id);
-  if (accepted.empty()) return out;
+  out.outdone = without_need(stage, so_far, options);
+  const auto accepted = ids_of(so_far, bends_flights);
+  if (accepted.empty() || !out.outdone.empty()) return out;
   const Stage& less = without(stage, accepted, options);
   if (!less.solved()) return out;
-  const int threads = options.fit.threads;
-  const auto flights = [&](const Stage& of, const FitResult& half) {
-    return traces_of(of.problem, half, Phase::flight, threads);
-  };
-  const PhaseTraces train = flights(less, less.fit);
+  const Flights flights(stage, less, options);
+  const PhaseTraces& train = flights.train();
   const MissingCandidate candidate = missing_terms(train.all, train.how);
-  const auto left_by = [](const MissingCandidate& by, const PhaseTraces& in) {
-    return rest_around(in.all, by, in.how);
-  };
-  const Rest effects = left_by({}, flights(stage, stage.fit)), form = left_by(candidate, train);
   // They may have no part in the flights, or these may lack no acceleration.
   const double lacked = beyond_noise(left_by({}, train));
-  if (!(lacked > 0 && beyond_noise(form) < kOutdone * lacked)) return out;
+  if (!(lacked > 0 && beyond_noise(left_by(candidate, train)) < kOutdone * lacked)) return out;
   std::vector<std::string> outdone = accepted;
   for (const MissingTerm& term : candidate.terms) {
     const auto is_its_own = [&](const std::string& id) {
@@ -80,21 +138,10 @@ AskedForm form_asked_for(const Stage& stage, const Discovery& so_far, const Disc
     out.unlisted |= std::none_of(accepted.begin(), accepted.end(), is_its_own);
     std::erase_if(outdone, is_its_own);
   }
-  if (!(beyond_noise(effects) < kOutdone * lacked)) return out;
-  const Rest effects_held_out = left_by({}, flights(stage, stage.held_out)),
-             form_held_out = left_by(candidate, flights(less, less.held_out));
+  if (!(beyond_noise(flights.effects()) < kOutdone * lacked)) return out;
   const double more =
       static_cast<double>(candidate.coefficients()) - static_cast<double>(unknowns_of(stage.fit, accepted));
-  const double bic =
-      more * std::log(static_cast<double>(std::max(2L, form.degrees_of_freedom))) - likelier(effects, form);
-  if (!(bic <= kDeltaBic) || !(likelier(effects_held_out, form_held_out) > 2 * std::log(kTimesAsLikely)))
-    return out;
-  // Beside a misfit that a form lowers by little, the effects may be true, and something acts beside them.
-  const auto halves = [](const Rest& by_form, const Rest& by_effects) {
-    return beyond_noise(by_form) < kOutdone * beyond_noise(by_effects);
-  };
-  if (leaves_flights(stage, options) && !(halves(form, effects) && halves(form_held_out, effects_held_out)))
-    return out;
+  if (!flights.outdone_by(candidate, more)) return out;
   out.outdone = std::move(outdone);
   out.words = candidate.in_words(train.names());
   return out;

@@ -19,6 +19,10 @@ inline constexpr double kOutdone = 0.5;
 /// the held-out flights kTimesAsLikely as likely; where the effects leave a misfit, if less than kOutdone of
 /// it is left in both halves, too. An effect whose own form is among those terms is not outdone but backed,
 /// also where effects explain little of the flights. Without words: nothing else is asked for.
+///
+/// Nothing at all outdoes effects that leave a misfit in flights which lack less, by the same measures (but
+/// without credit for unknowns), if all effects whose form is an acceleration are taken away, those of
+/// sensors that were seen in the hand included.
 AskedForm form_asked_for(const Stage& stage, const Discovery& so_far, const DiscoverOptions& options);
 
 }  // namespace unhand::fitting

@@ -78,7 +78,10 @@ FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out)
   const BothErrors errors = errors_of(stage, options.fit.threads);
   std::vector<std::string> gone, why;
   const AskedForm asked = form_asked_for(stage, out, options);
-  if (!asked.words.empty()) out.asked = asked;
+  if (!asked.words.empty())
+    out.asked = asked;
+  else if (!asked.outdone.empty())
+    out.asked.reset();  // it was asked for beside what flights do not need
   const auto is_among = [](const std::vector<std::string>& ids, const AcceptedEffect& effect) {
     return std::find(ids.begin(), ids.end(), effect.id) != ids.end();
   };
@@ -93,7 +96,9 @@ FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out)
     const bool stands = backed && !acts(effect, false);  // whatever is beside it
     if (here.empty() && last && !stands && spoils(effect, stage, out, options))
       here = "with it a channel is noisier than under the base model";
-    if (here.empty() && is_among(asked.outdone, effect)) here = "another form describes the flights better";
+    if (here.empty() && is_among(asked.outdone, effect))
+      here =
+          asked.words.empty() ? "flights lack less without it" : "another form describes the flights better";
     if (here.empty()) continue;
     for (const bool air : {false, true}) misled[air ? 1 : 0] |= acts(effect, air);
     gone.push_back(effect.id), why.push_back(here);

@@ -170,6 +170,24 @@ TEST(Unexplained, GravityDeclaredWrongIsNoLiftAndNoWind) {
   EXPECT_NEAR(form.terms[0].coefficient(0), -0.03, 0.003);
 }
 
+// An arm whose links are declared too long: the tracker's scale looks off against it, but then flights would
+// fall too slowly. A lift beside it nearly mends that. Without both they lack nothing.
+TEST(Unexplained, AHandWhoseLengthsAreOffIsNoScaleOfTheTracker) {
+  constexpr double kLong = 1.004;
+  for (const std::uint64_t seed : {2U, 5U}) {
+    datasets::ThrowLog log = experiment::generate_campaign(experiment::random_campaign(seed), seed);
+    for (auto& thrown : log.throws)
+      for (datasets::Series* series : {&thrown.hand->pose, &thrown.hand->twist, &thrown.hand->acceleration})
+        for (std::size_t k = 0; k < series->rows; ++k)
+          for (const std::size_t axis : {0U, 1U}) (*series)(k, axis) *= kLong;
+    const Discovery found = found_in(log);
+    EXPECT_EQ(found.verdict, Verdict::unexplained) << seed;
+    EXPECT_TRUE(found.effects.empty()) << seed << ": " << found.effects.front().id;
+    ASSERT_TRUE(found.unexplained) << seed;
+    EXPECT_EQ(found.unexplained->phase, Phase::grasped) << seed;
+  }
+}
+
 // Noise that is declared too small leaves the noise in every phase, by the same factor.
 TEST(Unexplained, ASigmaThatIsTooSmallIsSaidToDo) {
   constexpr double kFactor = 1.6;
