@@ -64,8 +64,6 @@ class Flights {
   const PhaseTraces& train() const { return train_; }
   /// What the effects leave there.
   const Rest& effects() const { return effects_; }
-  /// Whether the effects leave a misfit.
-  bool misfit() const { return misfit_; }
 
   /// Whether a form, of so many unknowns more, describes them better than the effects.
   bool outdone_by(const MissingCandidate& by, double more) const {
@@ -102,15 +100,13 @@ std::vector<std::string> ids_of(const Discovery& so_far, const Which& which) {
 /// Accepted effects that give flights an acceleration which these do not have.
 std::vector<std::string> without_need(const Stage& stage, const Discovery& so_far,
                                       const DiscoverOptions& options) {
-  auto bending = ids_of(so_far, [](const AcceptedEffect& effect) {
+  const auto bending = ids_of(so_far, [](const AcceptedEffect& effect) {
     return bends_flights(effect) ||
            (!is_law(effect.id) && find_effect(effect.id).form != dynamics::AccelerationForm::none);
   });
-  if (bending.empty()) return {};
+  if (bending.empty() || !leaves_flights(stage, options)) return {};
   const Stage& less = without(stage, bending, options);
-  if (!less.solved()) return {};
-  const Flights flights(stage, less, options);
-  if (!flights.misfit() || !flights.outdone_by({}, 0)) bending.clear();
+  if (!less.solved() || !Flights(stage, less, options).outdone_by({}, 0)) return {};
   return bending;
 }
 
