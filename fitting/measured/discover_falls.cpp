@@ -139,15 +139,14 @@ void explain(const datasets::ThrowLog& log, const FallProblem& problem, const Ef
   for (const std::string& note : problem.notes()) out.evidence.push_back({"", note, false});
   const auto [common, scatter] = mean_residual(problem, search.final);
   const double largest = std::max({scatter[0], scatter[1], scatter[2]});
-  bool gyroscope = true;
-  for (std::size_t i = 0; i < problem.groups().size(); ++i) gyroscope = gyroscope && problem.has_gyroscope(i);
   out.evidence.push_back(
       {"sensor.accelerometer_bias",
        fmt::format(
            "From fall to fall the mean of what is left scatters by ({:.3f}, {:.3f}, {:.3f}) m/s²; a turn of "
            "{:.1f} rad/s about an axis 5 cm from the sensor would do that, and {}",
            scatter[0], scatter[1], scatter[2], std::sqrt(largest / 0.05),
-           gyroscope ? "the gyroscope saw what turns there were" : "only a gyroscope could say"),
+           problem.has_gyroscope() ? "the gyroscope saw what turns there were"
+                                   : "only a gyroscope could say"),
        largest > 0.02});
   const double offset = std::max({std::abs(common[0]), std::abs(common[1]), std::abs(common[2])});
   if (offset > largest)

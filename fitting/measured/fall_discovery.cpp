@@ -61,7 +61,7 @@ struct FallProblem::AxisCounts {
   std::map<std::string, std::array<std::size_t, 3>> coarse;  // by object and axis
 };
 
-FallProblem::FallProblem(const datasets::ThrowLog& log, Zeros zeros) : gravity_(log.gravity) {
+FallProblem::FallProblem(const datasets::ThrowLog& log) : gravity_(log.gravity) {
   datasets::validate(log);
   channels_ = {"force_x", "force_y", "force_z"};
   covariates_ = {"speed at the start [m/s]", "duration [s]", "vertical along body z [-]", "order"};
@@ -73,7 +73,6 @@ FallProblem::FallProblem(const datasets::ThrowLog& log, Zeros zeros) : gravity_(
     if (const std::string why = add(one, splits[n], axes, counts); !why.empty())
       skipped_.push_back({one.id, why});
   }
-  if (zeros == Zeros::own) free_zeros({}, {});
   for (const auto& [what, times] : counts.left_out)
     notes_.push_back(fmt::format("{}: left out of {} falls", what, times));
   for (const auto& [object, of] : counts.coarse)
@@ -88,8 +87,7 @@ FallProblem::FallProblem(const datasets::ThrowLog& log, Zeros zeros) : gravity_(
                                 (skipped_.empty() ? "" : ": " + skipped_.front().second));
 }
 
-FallProblem::FallProblem(const datasets::ThrowLog& log, const GroupedFit& fit)
-    : FallProblem(log, Zeros::shared) {
+FallProblem::FallProblem(const datasets::ThrowLog& log, const GroupedFit& fit) : FallProblem(log) {
   std::vector<std::string> names;
   std::vector<double> values;
   for (std::size_t k = 0; k < fit.shared.size(); ++k)
@@ -136,11 +134,29 @@ std::string FallProblem::add(const datasets::Throw& one, datasets::Split split, 
   return {};
 }
 
+bool FallProblem::has_gyroscope() const {
+  return std::none_of(falls_.begin(), falls_.end(),
+                      [](const Fall& fall) { return fall.readings.samples.omega.empty(); });
+}
+
+std::vector<Vec3<double>> FallProblem::without_turns(std::size_t group,
+                                                     const dynamics::Values<double>& given) const {
+  const Fall& fall = falls_[group];
+  const auto turned = experiment::falling_readings<double>(started(fall, given, groups_[group].start),
+                                                           fall.readings.samples, gravity_, given);
+  std::vector<Vec3<double>> out = fall.readings.force;
+  for (std::size_t n = 0; n < out.size(); ++n) out[n] = flight::difference(out[n], turned[n]);
+  return out;
+}
+
 void FallProblem::free_zeros(std::span<const std::string> names, std::span<const double> values) {
   for (const std::string& object : objects_of(*this)) {
     const OwnNames mine(names, object);
     const std::vector<double> shared = mine.values(values);
     const dynamics::Values<double> given(mine.names, shared);
+    std::vector<std::vector<Vec3<double>>> force(falls_.size());
+    for (std::size_t i = 0; i < falls_.size(); ++i)
+      if (groups_[i].object == object) force[i] = without_turns(i, given);
     for (std::size_t a = 0; a < 3; ++a) {
       std::vector<double> zeros, variances;
       std::vector<Fall*> of;
@@ -150,13 +166,7 @@ void FallProblem::free_zeros(std::span<const std::string> names, std::span<const
             std::find(fall.axes.begin(), fall.axes.end(), a) == fall.axes.end())
           continue;
         const double still = std::clamp(fall.before.speed / gravity_, 0.0, fall.readings.samples.time.back());
-        std::vector<Vec3<double>> force = fall.readings.force;
-        if (!names.empty()) {
-          const auto turned = experiment::falling_readings<double>(started(fall, given, groups_[i].start),
-                                                                   fall.readings.samples, gravity_, given);
-          for (std::size_t n = 0; n < force.size(); ++n) force[n] = flight::difference(force[n], turned[n]);
-        }
-        const Smoothed zero = smoothed_at(fall.readings.samples.time, force, a, still);
+        const Smoothed zero = smoothed_at(fall.readings.samples.time, force[i], a, still);
         zeros.push_back(zero.value), variances.push_back(zero.variance * fall.sigma[a] * fall.sigma[a]);
         of.push_back(&fall);
       }

@@ -17,22 +17,17 @@ namespace unhand::fitting {
 /// the grid of its readings adds. An axis that says nothing of a fall, as it stands still or is cut off, is
 /// left out of it.
 ///
-/// With Zeros::own, every fall has a zero of its own: biases wander from recording to recording, and a steady
+/// Beside a fit, every fall has a zero of its own: biases wander from recording to recording, and a steady
 /// turn about an axis off the sensor adds a constant as well. What readings differ by from fall to fall where
 /// the object does not move, at the start of a fall or at the apex, is then noise that all samples of an axis
 /// share, and their mean counts by so much less. (What a lever arm that was found makes of the turns that a
 /// gyroscope saw is taken off first: it differs from fall to fall, too, and is no zero.)
 class FallProblem final : public GroupedProblem {
  public:
-  /// What a sensor reads of no force.
-  enum class Zeros {
-    shared,  ///< is the same in all recordings
-    own,     ///< differs from recording to recording
-  };
-  /// Throws datasets::LogError for a log that breaks the rules of its kind, std::invalid_argument when no
-  /// throw can be used.
-  explicit FallProblem(const datasets::ThrowLog& log, Zeros zeros = Zeros::shared);
-  /// With Zeros::own, beside what `fit` found.
+  /// What the sensor reads of no force is the same in all recordings. Throws datasets::LogError for a log
+  /// that breaks the rules of its kind, std::invalid_argument when no throw can be used.
+  explicit FallProblem(const datasets::ThrowLog& log);
+  /// It differs from recording to recording, beside what `fit` found.
   FallProblem(const datasets::ThrowLog& log, const GroupedFit& fit);
   std::vector<dynamics::Effect> effects() const override;
   GroupEquations equations(std::size_t group, std::span<const std::string> names,
@@ -49,8 +44,8 @@ class FallProblem final : public GroupedProblem {
   Eigen::VectorXd left_of(std::size_t group, const Eigen::VectorXd& residual) const;
   /// The axes that a fall's rows are of, in their order at every sample.
   const std::vector<std::size_t>& axes(std::size_t group) const { return falls_[group].axes; }
-  /// Whether a gyroscope was read in a fall.
-  bool has_gyroscope(std::size_t group) const { return !falls_[group].readings.samples.omega.empty(); }
+  /// Whether a gyroscope was read in every fall.
+  bool has_gyroscope() const;
   /// What the readings are like: axes that were left out, and coarse ones.
   const std::vector<std::string>& notes() const { return notes_; }
 
@@ -66,6 +61,9 @@ class FallProblem final : public GroupedProblem {
   /// Makes a group of a throw, or says why it is none.
   std::string add(const datasets::Throw& one, datasets::Split split, const ForceAxes& axes,
                   AxisCounts& counts);
+  /// The samples of a fall, less what the sensor would read of the turns that a gyroscope saw.
+  std::vector<flight::Vec3<double>> without_turns(std::size_t group,
+                                                  const dynamics::Values<double>& given) const;
   /// `names` and `values` as of `equations`.
   void free_zeros(std::span<const std::string> names, std::span<const double> values);
   /// The fall that starts as its own unknowns `x` say, with a sensor that errs as `given` says.

@@ -242,7 +242,7 @@ TEST(FallDiscovery, ZerosThatDifferFromFallToFallAreNeitherADriftNorALargerDrag)
 TEST(FallDiscovery, AFallHasAZeroOfItsOwn) {
   for (const double scatter : {0.0, 0.06}) {
     const auto log = falls({.bias_x = 0.5, .drag = 0.045, .bias_scatter = scatter}, 60, 71);
-    const FallProblem shared(log), own(log, FallProblem::Zeros::own);
+    const FallProblem shared(log), own(log, GroupedFit{});
     std::vector<std::string> names{"flight.quadratic_drag.k"};
     const double k[] = {0.045};
     double squares = 0, noise = 0;

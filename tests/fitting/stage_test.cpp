@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <map>
 #include <random>
 #include <string>
@@ -646,29 +647,42 @@ TEST(Separating, AnExperimentBringsWhatItPromised) {
   EXPECT_NEAR(then.front().before, promise->after, 0.2 * (promise->before - promise->after));
 }
 
+/// A fit that leaves χ² of so much per sample, of n samples each.
+struct Left {
+  experiment::Channel channel;
+  Phase phase;
+  double per_sample;
+};
+FitResult leaving(std::initializer_list<Left> channels, int n = 1000) {
+  FitResult out;
+  for (const auto& [channel, phase, per_sample] : channels) {
+    auto& m = out.misfit.emplace_back();
+    m.channel = channel, m.phase = phase, m.n = n, m.chi2 = n * per_sample;
+  }
+  return out;
+}
+
+/// Whether an effect spoils a channel of an answer.
+bool spoilt(const AcceptedEffect& by, const FitResult& base, const FitResult& train,
+            const FitResult& held_out) {
+  Discovery so_far;
+  so_far.before.fit = base, so_far.before.held_out = base.misfit;
+  const CampaignProblem problem(support::loop_campaign({}), "synthetic", {});
+  return spoils(by, Stage{problem, train, held_out, {}}, so_far, {});
+}
+
 // A drag and a wind that together pass for a third law of the air bend the motion in the hand; a mass that
 // takes in a torque's gain makes the forces noisier, far below what they are trusted to. A drag that does so
 // frees friction of what had bent it. What only one half of the throws shows is not spoilt, nor what chance
 // moves.
 TEST(Spoils, IsAChannelThatTheAnswerLeavesNoisier) {
   const auto misfit = [](double grasped, double flight, int n = 1000) {
-    FitResult out;
-    for (const auto& [phase, per_sample] : {std::pair{Phase::grasped, grasped}, {Phase::flight, flight}}) {
-      auto& m = out.misfit.emplace_back();
-      m.channel = experiment::Channel::mocap_z, m.phase = phase, m.n = n, m.chi2 = n * per_sample;
-    }
-    return out;
+    constexpr auto z = experiment::Channel::mocap_z;
+    return leaving({{z, Phase::grasped, grasped}, {z, Phase::flight, flight}}, n);
   };
   AcceptedEffect drag, mass;
   drag.id = "flight.quadratic_drag", drag.phase = Phase::flight;
   mass.id = "sensor.mass", mass.phase = Phase::grasped;
-  const auto spoilt = [&](const AcceptedEffect& by, const FitResult& base, const FitResult& train,
-                          const FitResult& held_out) {
-    Discovery so_far;
-    so_far.before.fit = base, so_far.before.held_out = base.misfit;
-    const CampaignProblem problem(support::loop_campaign({}), "synthetic", {});
-    return spoils(by, Stage{problem, train, held_out, {}}, so_far, {});
-  };
   EXPECT_TRUE(spoilt(drag, misfit(1.1, 9000), misfit(3, 17), misfit(3, 17)));
   EXPECT_FALSE(spoilt(drag, misfit(1.1, 9000), misfit(1.1, 17), misfit(1.1, 17)));
   EXPECT_FALSE(spoilt(drag, misfit(2.5, 9000), misfit(3, 17), misfit(3, 17)));
@@ -683,24 +697,15 @@ TEST(Spoils, IsAChannelThatTheAnswerLeavesNoisier) {
 // landing that is left beyond its noise is spoilt here, too.
 TEST(Spoils, NoLandingThatIsWithinItsNoise) {
   const auto misfit = [](double x, double theta) {
-    FitResult out;
-    for (const auto& [channel, per_sample] :
-         {std::pair{experiment::Channel::landing_x, x}, {experiment::Channel::landing_theta, theta}}) {
-      auto& m = out.misfit.emplace_back();
-      m.channel = channel, m.phase = Phase::landing, m.n = 21, m.chi2 = m.n * per_sample;
-    }
-    return out;
+    return leaving({{experiment::Channel::landing_x, Phase::landing, x},
+                    {experiment::Channel::landing_theta, Phase::landing, theta}},
+                   21);
   };
   AcceptedEffect drag;
   drag.id = "flight.quadratic_drag", drag.phase = Phase::landing;
-  const auto spoilt = [&](const FitResult& now) {
-    Discovery so_far;
-    so_far.before.fit = misfit(543, 0.04), so_far.before.held_out = so_far.before.fit.misfit;
-    const CampaignProblem problem(support::loop_campaign({}), "synthetic", {});
-    return spoils(drag, Stage{problem, now, now, {}}, so_far, {});
-  };
-  EXPECT_FALSE(spoilt(misfit(0.6, 0.6)));
-  EXPECT_TRUE(spoilt(misfit(0.6, 3)));
+  const FitResult base = misfit(543, 0.04), within = misfit(0.6, 0.6), beyond = misfit(0.6, 3);
+  EXPECT_FALSE(spoilt(drag, base, within, within));
+  EXPECT_TRUE(spoilt(drag, base, beyond, beyond));
 }
 
 // Under a law that brings the wrench to its noise, held-out poses stay off by a third of what the base left.
@@ -709,13 +714,7 @@ TEST(Spoils, NoLandingThatIsWithinItsNoise) {
 TEST(Withdrawal, IsNotForWhatOnlyTheHeldOutThrowsShow) {
   using experiment::Channel;
   const auto misfit = [](double wrench, double pose) {
-    FitResult out;
-    for (const auto& [channel, per_sample] :
-         {std::pair{Channel::wrench_tau, wrench}, {Channel::mocap_x, pose}}) {
-      auto& m = out.misfit.emplace_back();
-      m.channel = channel, m.phase = Phase::release, m.n = 1000, m.chi2 = m.n * per_sample;
-    }
-    return out;
+    return leaving({{Channel::wrench_tau, Phase::release, wrench}, {Channel::mocap_x, Phase::release, pose}});
   };
   AcceptedEffect law;
   law.id = "contact.law:sliding_pivot", law.phase = Phase::release;
