@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 namespace unhand::contact {
 
@@ -80,7 +81,8 @@ GivingPoints<S>::GivingPoints(const FrictionLimits<S>& limits)
       loss_time_(limits.variation().loss_time),
       speed_(limits.speed()),
       limit_(points_.x.size()),
-      limit_dual_(kVaries<S> ? points_.x.size() : 0) {
+      limit_dual_(kVaries<S> ? points_.x.size() : 0),
+      led_(zero()) {
   using std::exp;
   const S& exponent = limits.variation().pressure_exponent;
   std::vector<S> load;
@@ -114,15 +116,15 @@ Stretch<S> GivingPoints<S>::zero() const {
 }
 
 template <class S>
-void GivingPoints<S>::extrapolate(const Stretch<S>& coarse, const Stretch<S>& fine, Stretch<S>& to) {
+void GivingPoints<S>::mix(double a, const Stretch<S>& p, double b, const Stretch<S>& q, Stretch<S>& to) {
   for (std::size_t i = 0; i < to.x.size(); ++i) {
-    to.x[i] = 2 * fine.x[i] - coarse.x[i];
-    to.z[i] = 2 * fine.z[i] - coarse.z[i];
+    to.x[i] = a * p.x[i] + b * q.x[i];
+    to.z[i] = a * p.z[i] + b * q.z[i];
   }
   for (std::size_t i = 0; i < to.dx.size(); ++i)
     for (std::size_t k = 0; k < to.dx[i].size(); ++k) {
-      to.dx[i][k] = 2 * fine.dx[i][k] - coarse.dx[i][k];
-      to.dz[i][k] = 2 * fine.dz[i][k] - coarse.dz[i][k];
+      to.dx[i][k] = a * p.dx[i][k] + b * q.dx[i][k];
+      to.dz[i][k] = a * p.dz[i][k] + b * q.dz[i][k];
     }
 }
 
@@ -260,37 +262,68 @@ bool GivingPoints<S>::solve(const Step& p, const Stretch<S>& from, const S& gain
   return minimum.found;
 }
 
+template <class S>
+typename GivingPoints<S>::Way GivingPoints<S>::way(std::size_t i, const Slip& q, const S& radius,
+                                                   const S& h) const {
+  const double time = value_of(h), a = value_of(radius), turn = value_of(q[2]);
+  const double px = points_.x[i], pz = points_.z[i];
+  const double vx = value_of(q[0]) - a * pz * turn, vz = value_of(q[1]) + a * px * turn;
+  Way out{time * vx, time * vz, {}, {}};
+  if constexpr (kVaries<S>) {
+    const Gradient by_turn = time * (a * q[2].v + turn * radius.v);
+    out.dx = time * q[0].v - pz * by_turn + vx * h.v;
+    out.dz = time * q[1].v + px * by_turn + vz * h.v;
+  }
+  return out;
+}
+
 /// The springs follow the slip as far as the limit lets them.
 template <class S>
 void GivingPoints<S>::move(const Stretch<S>& from, const Slip& slip, const S& radius, const S& h,
                            Stretch<S>& to) const {
-  const double time = value_of(h), a = value_of(radius);
-  const Vec3<double> q{value_of(slip[0]), value_of(slip[1]), value_of(slip[2])};
-  for (std::size_t i = 0; i < points_.x.size(); ++i) {
-    const double px = points_.x[i], pz = points_.z[i], x = a * px, z = a * pz;
-    const double vx = q[0] - z * q[2], vz = q[1] + x * q[2];
-    const double ux = from.x[i] + time * vx, uz = from.z[i] + time * vz;
-    const double size = std::sqrt(ux * ux + uz * uz), limit = limit_[i];
-    const double kept = size > limit ? limit / size : 1.0;
-    to.x[i] = kept * ux, to.z[i] = kept * uz;
-    if constexpr (kVaries<S>) {
-      const Gradient turn = time * (a * slip[2].v + q[2] * radius.v);
-      Gradient dx = gradient(from.dx[i]) + time * slip[0].v - pz * turn + vx * h.v;
-      Gradient dz = gradient(from.dz[i]) + time * slip[1].v + px * turn + vz * h.v;
-      if (size > limit) limited(ux / size, uz / size, kept, gradient(limit_dual_[i]), dx, dz);
-      gradient(to.dx[i]) = dx, gradient(to.dz[i]) = dz;
-    }
+  for (std::size_t i = 0; i < points_.x.size(); ++i) move(i, from, way(i, slip, radius, h), to);
+}
+template <class S>
+void GivingPoints<S>::move(std::size_t i, const Stretch<S>& from, const Way& way, Stretch<S>& to) const {
+  const double ux = from.x[i] + way.x, uz = from.z[i] + way.z;
+  const double size = std::sqrt(ux * ux + uz * uz), limit = limit_[i];
+  const double kept = size > limit ? limit / size : 1.0;
+  to.x[i] = kept * ux, to.z[i] = kept * uz;
+  if constexpr (kVaries<S>) {
+    Gradient dx = gradient(from.dx[i]) + way.dx, dz = gradient(from.dz[i]) + way.dz;
+    if (size > limit) limited(ux / size, uz / size, kept, gradient(limit_dual_[i]), dx, dz);
+    gradient(to.dx[i]) = dx, gradient(to.dz[i]) = dz;
   }
+}
+
+template <class S>
+const Stretch<S>& GivingPoints<S>::led_to_limit(const Stretch<S>& from, const Slip& known, const S& radius,
+                                                const S& h) {
+  if (!(value_of(loss_time_) > 0)) return from;
+  bool any = false;
+  const double gx = value_of(h) * value_of(known[0]), gz = value_of(h) * value_of(known[1]),
+               turn = value_of(h) * value_of(known[2]) * value_of(radius);
+  for (std::size_t i = 0; i < points_.x.size(); ++i) {
+    const double x = gx - turn * points_.z[i], z = gz + turn * points_.x[i], sx = from.x[i], sz = from.z[i];
+    const double ux = sx + x, uz = sz + z, limit = limit_[i];
+    if (!(ux * ux + uz * uz > limit * limit && x * x + z * z < sx * sx + sz * sz)) continue;
+    if (!std::exchange(any, true)) led_ = from;
+    const Way way = this->way(i, known, radius, h);
+    move(i, from, way, led_);
+    led_.x[i] -= way.x, led_.z[i] -= way.z;
+    if constexpr (kVaries<S>) gradient(led_.dx[i]) -= way.dx, gradient(led_.dz[i]) -= way.dz;
+  }
+  return any ? led_ : from;
 }
 
 /// δ_i λ_i and its derivatives: friction at every point's own speed where it depends on that.
 template <class S>
-void GivingPoints<S>::set_limits(const S& yield, const S& radius, const Slip& before) {
+void GivingPoints<S>::set_limits(const S& yield, const S& radius, const Slip& known) {
   S limit = yield;
   for (std::size_t i = 0; i < points_.x.size(); ++i) {
     if (speed_.any()) {
-      const S turn = radius * before[2], vx = before[0] - points_.z[i] * turn,
-              vz = before[1] + points_.x[i] * turn;
+      const S turn = radius * known[2], vx = known[0] - points_.z[i] * turn,
+              vz = known[1] + points_.x[i] * turn;
       limit = speed_.factor(S(vx * vx + vz * vz)) * yield;
     }
     limit_[i] = load_[i] * value_of(limit);
@@ -310,9 +343,10 @@ bool GivingPoints<S>::step(const Step& p, const Stretch<S>& from, Stretch<S>& to
     for (int j = 0; j < 3; ++j) scaled.inertia[i][j] = p.inertia[i][j] / p.h;
     scaled.free[i] = dot3(scaled.inertia[i], p.free);
   }
-  set_limits(yield, radius, p.before);
-  const bool solved = solve(scaled, from, gain, radius, slip, wrench);
-  move(from, slip, radius, p.h, to);
+  set_limits(yield, radius, p.known);
+  const Stretch<S>& base = led_to_limit(from, p.known, radius, p.h);
+  const bool solved = solve(scaled, base, gain, radius, slip, wrench);
+  move(base, slip, radius, p.h, to);
   return solved;
 }
 
@@ -329,7 +363,7 @@ bool GivingPoints<S>::hold(const Vec3<S>& wrench, const S& force, const S& lengt
                {S(0), S(0), S(0)}};
   Slip moved{S(0), S(0), S(0)};
   Vec3<S> carried;
-  set_limits(force / stiffness_, radius, p.before);
+  set_limits(force / stiffness_, radius, p.known);
   const bool solved = solve(p, from, one, radius, moved, carried);
   move(from, moved, radius, one, to);
   return solved;

@@ -36,17 +36,18 @@ struct Stretch {
 ///   f_i = −k w_i (s_i + T v_i), no more than n μ f_N w_i λ_i;   δ = n μ f_N/k
 ///
 /// k = 1/compliance [N/m], T the loss time [s], a and μ as of FrictionLimits (the patch may shrink, and μ may
-/// depend on |v_i|, the point's own speed, taken at the begin of a step): the elasto-plastic friction of
+/// depend on |v_i|, the point's own speed, as it is known before a step): the elasto-plastic friction of
 /// [DupontHaywardArmstrongAltpeter2002] at every point, with Coulomb's limit on the whole of a point's force.
 /// The outer points slip before the inner ones; what creeps before the patch slips as a whole is theirs. As k
 /// grows, the sum tends to the limit surface of the disc; its torque limit is that of FrictionLimits exactly.
 ///
-/// Nothing here is a mode or an event. A step of the implicit Euler method is a convex problem in the slip
-/// q = (v_r, ω_r) at its end, in the hand's frame,
+/// Nothing here is a mode or an event. An implicit step that ends with y1 = y0 + h f(y1), y0 = (s_i, q_0), is
+/// a convex problem in the slip q = (v_r, ω_r) at its end, in the hand's frame,
 ///
 ///   min ½ (q − q_free)ᵀ N (q − q_free)/h + k/(h+T) Σ w_i ψ_i(s_i + (h+T) B_i q),   B_i q = v_r + ω_r J a p_i
 ///
 /// N = (G M⁻¹ Gᵀ)⁻¹, ψ_i(u) = |u|²/2 up to δ λ_i and linear beyond it.
+/// y0 and h are those of a stage of an implicit method.
 template <class S>
 class GivingPoints {
  public:
@@ -65,19 +66,19 @@ class GivingPoints {
 
   /// One implicit step of object and points.
   struct Step {
-    S h;              ///< [s]
+    S h;              ///< by which y' at the end counts [s]
     S force;          ///< n μ f_N [N] at the end, under Coulomb's law
     S length;         ///< L(f_N) [m] at the end
     Inertia inertia;  ///< N
     Slip free;        ///< the slip at the end without the points' wrench
-    Slip before;      ///< the slip at the begin
+    Slip known;       ///< the slip by which friction depends on speed
   };
   /// From `from` to `to` (not the same); `slip` is the first guess and the answer, `wrench` [N, N, N m] what
   /// acts on the object at the end. False if the iteration spends its budget.
   bool step(const Step& step, const Stretch<S>& from, Stretch<S>& to, Slip& slip, Vec3<S>& wrench);
 
-  /// 2 fine − coarse: of second order, where both are of first.
-  static void extrapolate(const Stretch<S>& coarse, const Stretch<S>& fine, Stretch<S>& to);
+  /// a p + b q
+  static void mix(double a, const Stretch<S>& p, double b, const Stretch<S>& q, Stretch<S>& to);
 
  private:
   struct Sum {
@@ -109,8 +110,20 @@ class GivingPoints {
               const S& gain, const S& radius, Slip& slip) const requires std::is_same_v<S, dynamics::Dual>;
   bool solve(const Step& problem, const Stretch<S>& from, const S& gain, const S& radius, Slip& slip,
              Vec3<S>& wrench);
+  /// How far a point goes in a step [m], in the hand's frame: h B_i q.
+  struct Way {
+    double x, z;
+    Eigen::Matrix<double, dynamics::kDualSize, 1> dx, dz;
+  };
+  Way way(std::size_t i, const Slip& slip, const S& radius, const S& h) const;
   void move(const Stretch<S>& from, const Slip& slip, const S& radius, const S& h, Stretch<S>& to) const;
-  void set_limits(const S& yield, const S& radius, const Slip& before);
+  void move(std::size_t i, const Stretch<S>& from, const Way& way, Stretch<S>& to) const;
+  /// Where a spring is at its limit, that moves it, too, and s_i + (h+T) v_i is wrong by what it does.
+  /// Without a damper this is nothing, since the force is at its limit as well. Else a step of a point that
+  /// goes less far than its spring is stretched begins at a stretch from which the slip, as it is known,
+  /// leads to the limit: wrong by h times what the slip is known wrong by.
+  const Stretch<S>& led_to_limit(const Stretch<S>& from, const Slip& known, const S& radius, const S& h);
+  void set_limits(const S& yield, const S& radius, const Slip& known);
 
   DiscPoints points_;
   std::vector<double> load_;                              ///< λ_i
@@ -119,6 +132,7 @@ class GivingPoints {
   SpeedDependence<S> speed_;
   std::vector<double> limit_;                              ///< how far the springs reach [m], in this step
   std::vector<typename Stretch<S>::Gradient> limit_dual_;  ///< empty where S is double
+  Stretch<S> led_;
 };
 
 extern template class GivingPoints<double>;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace unhand::release {
 
@@ -17,15 +18,15 @@ using dynamics::Wrench;
 namespace {
 
 /// The usual step [s] of pads that slip, at a relative tolerance of 1e-5; the error is of second order in it.
-constexpr double kStep = 5e-4, kStepTolerance = 1e-5;
-/// Shorter steps, down to the shortest [s], are taken where one of them and two of half its length are
-/// further from each other than `kMostApart` [m/s] times the relative tolerance: where a hand turns fast, or
-/// the tolerance is tight.
+constexpr double kStep = 8e-4, kStepTolerance = 1e-5;
+/// How far a step of the implicit Euler method and two of half its length would be apart, h²/4 |q''|, says
+/// how fast the slip q bends. Shorter steps, down to the shortest [s], are taken where that is more than
+/// `kMostApart` [m/s] times the relative tolerance: where a hand turns fast, or the tolerance is tight.
 constexpr double kMostApart = 300, kShortest = 1e-6;
-/// Steps that are `kMost` times as long at most are taken where one of them and two of half its length agree
-/// to `kAgree` [m/s] times the relative tolerance: where the pads hold, and stretch with the load. The
-/// difference is of second order, so a step of twice the length may follow if it is a quarter of that.
-constexpr double kMost = 8, kAgree = 1, kDoubled = 0.25;
+/// Steps that are `kMost` times as long at most are taken where it is no more than `kAgree` [m/s] times the
+/// relative tolerance: where the pads hold, and stretch with the load. It is of second order, so a step of
+/// twice the length may follow if it is a quarter of that.
+constexpr double kMost = 5, kAgree = 1, kDoubled = 0.25;
 
 /// How long steps may be.
 struct Pace {
@@ -40,10 +41,10 @@ struct Pace {
     agree = kAgree * relative;
     most_apart = kMostApart * relative;
   }
-  /// The length [s] below which a step is not halved, and how far apart [m/s] its two answers may be.
+  /// The length [s] below which a step is not halved, and how far apart [m/s] two of Euler's may be.
   double least(double length) const { return length > slipping ? slipping : std::min(kShortest, slipping); }
   double allowed(double length) const { return length > slipping ? agree : most_apart; }
-  /// The length [s] of the next step after one whose two answers were so far apart.
+  /// The length [s] of the next step after one that says so.
   double next(double usual, double length, double apart) const {
     if (apart <= kDoubled * agree) return std::max(usual, std::min(2 * length, longest));
     if (apart <= kDoubled * most_apart) return std::max(usual, std::min(2 * length, slipping));
@@ -58,18 +59,26 @@ struct Moving {
   Vec3<S> wrench;  ///< on the object about the patch, in the hand's frame [N, N, N m]
 };
 
-/// Slip and spin in world axes [m/s, m/s, rad/s], to begin a search at.
-using SlipGuess = Vec3<double>;
-
+/// a x + b y
 template <class S>
-SlipGuess slip_of(const Relative<S>& y) {
-  return {value_of(y.slip.x), value_of(y.slip.z), value_of(y.spin)};
+Relative<S> mixed(double a, const Relative<S>& x, double b, const Relative<S>& y) {
+  const State<S, 6> p = x.state(), q = y.state();
+  State<S, 6> out;
+  for (int i = 0; i < 6; ++i) out[i] = a * p[i] + b * q[i];
+  return Relative<S>::from(out);
 }
 
+/// Steps of length h by the L-stable SDIRK method of second order [HairerWanner1996, IV.6], γ = 1 − 1/√2:
+///
+///   y1 = y0 + γ h f(y1)                                  at t0 + γ h
+///   y2 = y0 + (1−γ) h f(y1) + γ h f(y2) = y0 + (1−γ)/γ (y1 − y0) + γ h f(y2)
 template <class S>
 class Stepper {
  public:
-  Stepper(const contact::FrictionLimits<S>& limits) : limits_(limits), points_(limits) {}
+  static constexpr double kGamma = 1 - 0.5 * std::numbers::sqrt2;
+
+  explicit Stepper(const contact::FrictionLimits<S>& limits)
+      : limits_(limits), points_(limits), base_(points_.zero()) {}
 
   Moving<S> unloaded(const GivingStart<S>& from) const {
     return {from.relative, points_.zero(), {from.hold.wrench.fx, from.hold.wrench.fz, from.hold.wrench.tau}};
@@ -80,51 +89,63 @@ class Stepper {
                         at.stretch);
   }
 
-  /// One implicit step of length h to `scene`, the world at its end, with a first guess of the slip there.
-  bool step(const S& h, const Scene<S>& scene, const Moving<S>& from, const SlipGuess& guess, Moving<S>& to) {
-    const Relative<S>& y = from.relative;
-    // Where the object will be, as the old slip says: explicit here keeps the step convex.
-    const Relative<S> ahead = moved(y, h, scene, y.slip, y.spin);
-    const State<S, 6> rate = contact::relative_rate(scene, ahead, Wrench<S>{});
-    const S& theta = scene.hand.theta;
-    const Vec2<S> free = dynamics::rotate(S(-theta), Vec2<S>{y.slip.x + h * rate[3], y.slip.z + h * rate[4]});
-    const Vec2<S> lever = dynamics::rotate(ahead.angle, ahead.arm);
-    const auto& [m, I] = scene.body;
-    const S zx = -m * lever.z, zz = m * lever.x;
-    const Vec2<S> before = dynamics::rotate(S(-theta), y.slip);
-    const Vec2<double> near = dynamics::rotate(-value_of(theta), Vec2<double>{guess[0], guess[1]});
-    Vec3<S> slip{S(near.x), S(near.z), S(guess[2])};
-    const typename contact::GivingPoints<S>::Step step{
-        h,
-        limits_.coulomb(scene.normal_force),
-        limits_.length(scene.normal_force),
-        {{{m, S(0), zx}, {S(0), m, zz}, {zx, zz, I + m * dot(lever, lever)}}},
-        {free.x, free.z, y.spin + h * rate[5]},
-        {before.x, before.z, y.spin}};
-    const bool solved = points_.step(step, from.stretch, to.stretch, slip, to.wrench);
-    to.relative = moved(y, h, scene, dynamics::rotate(theta, Vec2<S>{slip[0], slip[1]}), slip[2]);
-    return solved;
+  /// From `from` to y1, γ h = `gain`, the world there `scene`. `known` has the slip that is expected there.
+  bool first(const S& gain, const Scene<S>& scene, const Moving<S>& from, const Relative<S>& known,
+             Moving<S>& to) {
+    return stage(gain, scene, from.relative, from.stretch, known, to);
   }
-
-  /// 2 fine − coarse
-  void extrapolate(const Moving<S>& coarse, const Moving<S>& fine, Moving<S>& to) const {
-    const State<S, 6> a = coarse.relative.state(), b = fine.relative.state();
-    State<S, 6> y;
-    for (int i = 0; i < 6; ++i) y[i] = 2.0 * b[i] - a[i];
-    to.relative = Relative<S>::from(y);
-    for (int i = 0; i < 3; ++i) to.wrench[i] = 2.0 * fine.wrench[i] - coarse.wrench[i];
-    contact::GivingPoints<S>::extrapolate(coarse.stretch, fine.stretch, to.stretch);
+  /// To y2, where y1 is known.
+  bool second(const S& gain, const Scene<S>& scene, const Moving<S>& from, const Moving<S>& first,
+              Moving<S>& to) {
+    constexpr double kAgain = (1 - kGamma) / kGamma;
+    contact::GivingPoints<S>::mix(1 - kAgain, from.stretch, kAgain, first.stretch, base_);
+    return stage(gain, scene, mixed(1 - kAgain, from.relative, kAgain, first.relative), base_,
+                 straight_on(from, first), to);
+  }
+  /// What y2 would be on the straight line through y0 and y1.
+  static Relative<S> straight_on(const Moving<S>& from, const Moving<S>& first) {
+    return mixed(1 - 1 / kGamma, from.relative, 1 / kGamma, first.relative);
   }
 
  private:
-  static Relative<S> moved(const Relative<S>& y, const S& h, const Scene<S>& scene, const Vec2<S>& slip,
+  /// y = base + gain f(y).
+  /// `known` has the slip that says where the object will be and how friction that depends on speed acts:
+  /// explicit in both, the problem is convex.
+  bool stage(const S& gain, const Scene<S>& scene, const Relative<S>& base,
+             const contact::Stretch<S>& stretch, const Relative<S>& known, Moving<S>& to) {
+    const Relative<S> ahead = moved(base, gain, scene, known.slip, known.spin);
+    const State<S, 6> rate = contact::relative_rate(scene, ahead, Wrench<S>{});
+    const Vec2<S> free = in_hand(scene, {base.slip.x + gain * rate[3], base.slip.z + gain * rate[4]});
+    const Vec2<S> lever = dynamics::rotate(ahead.angle, ahead.arm);
+    const auto& [m, I] = scene.body;
+    const S zx = -m * lever.z, zz = m * lever.x;
+    const Vec2<S> expected = in_hand(scene, known.slip);
+    Vec3<S> slip{expected.x, expected.z, known.spin};
+    const typename contact::GivingPoints<S>::Step problem{
+        gain,
+        limits_.coulomb(scene.normal_force),
+        limits_.length(scene.normal_force),
+        {{{m, S(0), zx}, {S(0), m, zz}, {zx, zz, I + m * dot(lever, lever)}}},
+        {free.x, free.z, base.spin + gain * rate[5]},
+        slip};
+    const bool solved = points_.step(problem, stretch, to.stretch, slip, to.wrench);
+    to.relative =
+        moved(base, gain, scene, dynamics::rotate(scene.hand.theta, Vec2<S>{slip[0], slip[1]}), slip[2]);
+    return solved;
+  }
+
+  static Vec2<S> in_hand(const Scene<S>& scene, const Vec2<S>& v) {
+    return dynamics::rotate(S(-scene.hand.theta), v);
+  }
+  static Relative<S> moved(const Relative<S>& base, const S& gain, const Scene<S>& scene, const Vec2<S>& slip,
                            const S& spin) {
-    const S angle = y.angle + h * spin;
-    return {y.arm + h * dynamics::rotate(S(-scene.hand.theta - angle), slip), angle, slip, spin};
+    const S angle = base.angle + gain * spin;
+    return {base.arm + gain * dynamics::rotate(S(-scene.hand.theta - angle), slip), angle, slip, spin};
   }
 
   const contact::FrictionLimits<S>& limits_;
   contact::GivingPoints<S> points_;
+  contact::Stretch<S> base_;
 };
 
 template <class S>
@@ -150,11 +171,10 @@ void record(dynamics::Trajectory<S, 6>& trajectory, const S& t0, const S& t1, co
   trajectory.pieces.push_back(std::move(piece));
 }
 
-/// How far two slips are from each other [m/s], the spin's part at the object's radius of gyration.
+/// How large the slip is [m/s], the spin's part at the object's radius of gyration.
 template <class S>
-double distance(const Relative<S>& a, const Relative<S>& b, const dynamics::RigidBody<S>& body) {
-  const double x = value_of(a.slip.x) - value_of(b.slip.x), z = value_of(a.slip.z) - value_of(b.slip.z),
-               spin = value_of(a.spin) - value_of(b.spin);
+double size(const Relative<S>& y, const dynamics::RigidBody<S>& body) {
+  const double x = value_of(y.slip.x), z = value_of(y.slip.z), spin = value_of(y.spin);
   return std::sqrt(x * x + z * z + value_of(body.inertia) / value_of(body.mass) * spin * spin);
 }
 
@@ -180,9 +200,9 @@ class GivingRelease {
         t_(problem.start),
         window_{problem.start, problem.start},
         at_(stepper_.unloaded(start)),
-        coarse_(at_),
-        half_(at_),
-        fine_(at_) {}
+        stage_(at_),
+        next_(at_),
+        before_(at_.relative) {}
 
   /// Loads the pads for a stretch that begins now.
   Outcome load(double end) {
@@ -194,7 +214,8 @@ class GivingRelease {
     const S from = t_;
     window_ = {value_of(from), value_of(stop)};
     if (!(window_.end > window_.begin)) return Outcome::finished;
-    State<S, 6> rate = rate_of(at_, scenes_.scene(window_, t_));
+    length_ = 0;
+    if (options_.record) rate_ = rate_of(at_, scenes_.scene(window_, t_));
     while (value_of(t_) < window_.end) {
       if (result_.statistics.steps >= options_.step_budget) return Outcome::step_budget_spent;
       const double begin = value_of(t_), left = window_.end - begin;
@@ -202,19 +223,17 @@ class GivingRelease {
       const double done = (begin + length - window_.begin) / (window_.end - window_.begin);
       const S next = steps == 1 ? stop : S(from + (stop - from) * done);
       const Scene<S> there = scenes_.scene(window_, next);
-      const bool solved = attempt(next, there, rate);
-      const double apart = distance(coarse_.relative, fine_.relative, body_);
+      const Attempt made = attempt(next, there);
       const double tried = std::min(length, usual_), least = pace_.least(tried);
-      if (tried > least && !(solved && apart <= pace_.allowed(tried))) {
+      if (tried > least && !(made.solved && made.apart <= pace_.allowed(tried))) {
         usual_ = std::max(least, 0.5 * length);
         ++result_.statistics.rejected_steps;
         continue;
       }
-      if (!solved)
-        return is_finite(coarse_.relative) && is_finite(fine_.relative) ? Outcome::not_converged
-                                                                        : Outcome::not_finite;
-      usual_ = pace_.next(usual_, length, apart);
-      if (!accept(next, there, rate)) return Outcome::not_finite;
+      if (!(is_finite(stage_.relative) && is_finite(next_.relative))) return Outcome::not_finite;
+      if (!made.solved) return Outcome::not_converged;
+      usual_ = pace_.next(usual_, length, made.apart);
+      accept(next, there);
     }
     return Outcome::finished;
   }
@@ -230,30 +249,33 @@ class GivingRelease {
   }
 
  private:
-  /// To `next` in one step and in two of half its length, `rate` the state's now; whether all were solved.
-  bool attempt(const S& next, const Scene<S>& there, const State<S, 6>& rate) {
-    const S h = next - t_, middle = t_ + 0.5 * h;
-    const SlipGuess now = slip_of(at_.relative);
-    SlipGuess ahead = now;
-    for (int i = 0; i < 3; ++i) ahead[i] += value_of(h) * value_of(rate[3 + i]);
-    if (!stepper_.step(h, there, at_, ahead, coarse_)) return false;
-    const SlipGuess end = slip_of(coarse_.relative);
-    SlipGuess between;
-    for (int i = 0; i < 3; ++i) between[i] = 0.5 * (now[i] + end[i]);
-    return stepper_.step(S(0.5 * h), scenes_.scene(window_, middle), at_, between, half_) &&
-           stepper_.step(S(0.5 * h), there, half_, end, fine_);
+  /// A step to next_: whether it was solved, and how far apart two of Euler's would be [m/s].
+  struct Attempt {
+    bool solved;
+    double apart;
+  };
+  Attempt attempt(const S& next, const Scene<S>& there) {
+    constexpr double kGamma = Stepper<S>::kGamma;
+    const S h = next - t_, gain = kGamma * h;
+    const double ahead = length_ > 0 ? kGamma / (1 - kGamma) * value_of(h) / length_ : 0;
+    const Relative<S> known = mixed(1 + ahead, at_.relative, -ahead, before_);
+    const bool solved = stepper_.first(gain, scenes_.scene(window_, t_ + gain), at_, known, stage_) &&
+                        stepper_.second(gain, there, at_, stage_, next_);
+    const Relative<S> bent = mixed(1, next_.relative, -1, Stepper<S>::straight_on(at_, stage_));
+    return {solved, size(bent, body_) / (4 * kGamma * (1 - kGamma))};
   }
-  /// Moves on to what both say; false where that is not finite. `rate` becomes that of the new state.
-  bool accept(const S& next, const Scene<S>& there, State<S, 6>& rate) {
-    const State<S, 6> before = at_.relative.state(), rate_before = rate;
-    stepper_.extrapolate(coarse_, fine_, at_);
-    if (!is_finite(at_.relative)) return false;
-    rate = rate_of(at_, there);
-    if (options_.record)
-      record(result_.trajectory, t_, next, window_, before, rate_before, at_.relative.state(), rate);
+  void accept(const S& next, const Scene<S>& there) {
+    length_ = value_of(next) - value_of(t_);
+    before_ = stage_.relative;
+    std::swap(at_, next_);
+    if (options_.record) {
+      const State<S, 6> rate = rate_of(at_, there);
+      record(result_.trajectory, t_, next, window_, next_.relative.state(), rate_, at_.relative.state(),
+             rate);
+      rate_ = rate;
+    }
     t_ = next;
     ++result_.statistics.steps;
-    return true;
   }
 
   const dynamics::RigidBody<S> body_;
@@ -264,7 +286,10 @@ class GivingRelease {
   Stepper<S> stepper_;
   S t_;
   dynamics::Window window_;
-  Moving<S> at_, coarse_, half_, fine_;
+  Moving<S> at_, stage_, next_;
+  Relative<S> before_;  // at the stage of the last step
+  double length_{};     // of that [s]; 0 for none
+  State<S, 6> rate_;    // of at_
   ReleaseResult<S> result_;
 };
 
