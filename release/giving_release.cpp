@@ -19,10 +19,10 @@ namespace {
 
 /// The usual step [s] of pads that slip, at a relative tolerance of 1e-5; the error is of second order in it.
 constexpr double kStep = 8e-4, kStepTolerance = 1e-5;
-/// How far a step of the implicit Euler method and two of half its length would be apart, h²/4 |q''|, says
-/// how fast the slip q bends. Shorter steps, down to the shortest [s], are taken where that is more than
-/// `kMostApart` [m/s] times the relative tolerance: where a hand turns fast, or the tolerance is tight.
-constexpr double kMostApart = 300, kShortest = 1e-6;
+/// A step is judged by how its slip q bends: h²/4 |q''|, by which an Euler step and two of half its length
+/// are apart. Shorter ones, down to the shortest [s], are taken where that is more than `kMostBend` [m/s]
+/// times the relative tolerance: where a hand turns fast, or the tolerance is tight.
+constexpr double kMostBend = 300, kShortest = 1e-6;
 /// Steps that are `kMost` times as long at most are taken where it is no more than `kAgree` [m/s] times the
 /// relative tolerance: where the pads hold, and stretch with the load. It is of second order, so a step of
 /// twice the length may follow if it is a quarter of that.
@@ -31,7 +31,7 @@ constexpr double kMost = 5, kAgree = 1, kDoubled = 0.25;
 /// How long steps may be.
 struct Pace {
   double slipping, longest;  ///< s
-  double agree, most_apart;  ///< m/s
+  double agree, most_bend;   ///< m/s
 
   explicit Pace(const dynamics::IntegratorOptions& options) {
     const double relative = options.tolerances.relative;
@@ -39,15 +39,15 @@ struct Pace {
     slipping = std::min(step, options.longest_step);
     longest = std::min(kMost * step, options.longest_step);
     agree = kAgree * relative;
-    most_apart = kMostApart * relative;
+    most_bend = kMostBend * relative;
   }
-  /// The length [s] below which a step is not halved, and how far apart [m/s] two of Euler's may be.
+  /// The length [s] below which a step is not halved, and how far it may bend [m/s].
   double least(double length) const { return length > slipping ? slipping : std::min(kShortest, slipping); }
-  double allowed(double length) const { return length > slipping ? agree : most_apart; }
-  /// The length [s] of the next step after one that says so.
-  double next(double usual, double length, double apart) const {
-    if (apart <= kDoubled * agree) return std::max(usual, std::min(2 * length, longest));
-    if (apart <= kDoubled * most_apart) return std::max(usual, std::min(2 * length, slipping));
+  double allowed(double length) const { return length > slipping ? agree : most_bend; }
+  /// The length [s] of the next step after one that bends so far.
+  double next(double usual, double length, double bend) const {
+    if (bend <= kDoubled * agree) return std::max(usual, std::min(2 * length, longest));
+    if (bend <= kDoubled * most_bend) return std::max(usual, std::min(2 * length, slipping));
     return usual;
   }
 };
@@ -108,9 +108,8 @@ class Stepper {
   }
 
  private:
-  /// y = base + gain f(y).
-  /// `known` has the slip that says where the object will be and how friction that depends on speed acts:
-  /// explicit in both, the problem is convex.
+  /// y = base + gain f(y). `known` has the slip that says where the object will be and how friction that
+  /// depends on speed acts: explicit in both, the problem is convex.
   bool stage(const S& gain, const Scene<S>& scene, const Relative<S>& base,
              const contact::Stretch<S>& stretch, const Relative<S>& known, Moving<S>& to) {
     const Relative<S> ahead = moved(base, gain, scene, known.slip, known.spin);
@@ -225,14 +224,14 @@ class GivingRelease {
       const Scene<S> there = scenes_.scene(window_, next);
       const Attempt made = attempt(next, there);
       const double tried = std::min(length, usual_), least = pace_.least(tried);
-      if (tried > least && !(made.solved && made.apart <= pace_.allowed(tried))) {
+      if (tried > least && !(made.solved && made.bend <= pace_.allowed(tried))) {
         usual_ = std::max(least, 0.5 * length);
         ++result_.statistics.rejected_steps;
         continue;
       }
       if (!(is_finite(stage_.relative) && is_finite(next_.relative))) return Outcome::not_finite;
       if (!made.solved) return Outcome::not_converged;
-      usual_ = pace_.next(usual_, length, made.apart);
+      usual_ = pace_.next(usual_, length, made.bend);
       accept(next, there);
     }
     return Outcome::finished;
@@ -249,10 +248,10 @@ class GivingRelease {
   }
 
  private:
-  /// A step to next_: whether it was solved, and how far apart two of Euler's would be [m/s].
+  /// A step to next_: whether it was solved, and how far it bends [m/s].
   struct Attempt {
     bool solved;
-    double apart;
+    double bend;
   };
   Attempt attempt(const S& next, const Scene<S>& there) {
     constexpr double kGamma = Stepper<S>::kGamma;

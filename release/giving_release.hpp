@@ -16,15 +16,15 @@ struct GivingStart {
   int free_mode{};                ///< the mode in which the object is free
 };
 
-/// Steps the points (contact::GivingPoints) with the rigid body by the implicit Euler method in the object's
-/// motion against the hand,
+/// Steps the points (contact::GivingPoints) with the rigid body by an implicit Runge-Kutta method of two
+/// stages, of second order and L-stable, whatever the springs. Each solves for the object's motion against
+/// the hand at its end,
 ///
-///   N (q₁ − q₀ − h b)/h = f(q₁),   q = (v_r, ω_r),   b its rate without friction, N = (G M⁻¹ Gᵀ)⁻¹,
+///   N (q − q₀ − h b)/h = f(q),   q = (v_r, ω_r),   b its rate without friction, N = (G M⁻¹ Gᵀ)⁻¹,
 ///
-/// twice with h/2 and once with h, which are extrapolated: second order, L-stable, whatever the springs. h is
-/// the one that the tolerances give to pads that slip, and up to 8 times that where both agree. Derivatives
-/// are those of the steps that were taken. The recorded trajectory has the rate at the ends of its pieces
-/// that the points' wrench there gives.
+/// with q₀ and h of the stage. Steps are as long as the tolerances give to pads that slip, and up to 5 times
+/// that where the slip hardly bends. Derivatives are those of the steps that were taken. The recorded
+/// trajectory has the rate at the ends of its pieces that the points' wrench there gives.
 template <class S>
 ReleaseResult<S> simulate_giving_release(const ReleaseProblem<S>& problem, const contact::GivesAtPoints& pads,
                                          const contact::SceneSource& scenes, const GivingStart<S>& start,
