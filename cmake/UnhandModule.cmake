@@ -105,8 +105,7 @@ endfunction()
 function(unhand_test_options)
   add_library(unhand_test_options INTERFACE)
   target_link_libraries(unhand_test_options INTERFACE unhand_warnings GTest::gmock GTest::gtest_main)
-  # Less to compile than with -O1; what takes time is in the library.
-  target_compile_options(unhand_test_options INTERFACE $<$<CONFIG:Release>:-Og> $<$<BOOL:${UNHAND_SANITIZE}>:-O0>)
+  target_compile_options(unhand_test_options INTERFACE $<$<CONFIG:Release>:-Og>)  # less to compile than -O1; what takes time is in the library
   if(NOT CMAKE_CXX_COMPILER_LAUNCHER)  # a compiler cache does better without
     add_executable(test_headers ${PROJECT_SOURCE_DIR}/cmake/empty.cpp)
     target_link_libraries(test_headers PRIVATE unhand_test_options Eigen3::Eigen)
