@@ -99,8 +99,9 @@ std::vector<FallingBody<S>> falling_bodies(const FallStart<S>& start, const Fall
   flight::SpatialAir<S> air;
   dynamics::apply_effects(flight::spatial_effects(), values, air);
   const auto& time = samples.time;
-  for (const auto& [name, size] :
-       {std::pair{"omega", samples.omega.size()}, {"turned", samples.turned.size()}})
+  for (const auto& [name, size] : {std::pair{"omega", samples.omega.size()},
+                                   {"omega_rate", samples.omega_rate.size()},
+                                   {"turned", samples.turned.size()}})
     if (size != 0 && size != time.size())
       throw std::invalid_argument(
           fmt::format("falling_bodies: {} has {} rows, and time {}", name, size, time.size()));
@@ -123,12 +124,7 @@ std::vector<FallingBody<S>> falling_bodies(const FallStart<S>& start, const Fall
       body.velocity += 0.5 * dt * (slope + slope_at(ahead));
     }
     if (!samples.omega.empty()) body.omega = samples.omega[i];
-    if (!samples.omega.empty() && time.size() > 1) {
-      const std::size_t before = i > 0 ? i - 1 : 0, after = std::min(i + 1, time.size() - 1);
-      for (std::size_t a = 0; a < 3; ++a)
-        body.omega_rate[a] =
-            (samples.omega[after][a] - samples.omega[before][a]) / (time[after] - time[before]);
-    }
+    if (!samples.omega_rate.empty()) body.omega_rate = samples.omega_rate[i];
     out.push_back(body);
   }
   return out;

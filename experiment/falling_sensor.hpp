@@ -45,9 +45,10 @@ flight::Vec3<S> specific_force(const Accelerometer<S>& sensor, const flight::Spa
 
 /// When a falling sensor was read, and what a gyroscope beside it said.
 struct FallSamples {
-  std::vector<double> time;                  ///< from the first sample [s]
-  std::vector<flight::Vec3<double>> omega;   ///< ω, body axes [rad/s]; empty: no gyroscope, taken as zero
-  std::vector<flight::Vec3<double>> turned;  ///< ∫ ω dt as a rotation vector [rad]; empty likewise
+  std::vector<double> time;                 ///< from the first sample [s]
+  std::vector<flight::Vec3<double>> omega;  ///< ω, body axes [rad/s]; empty: no gyroscope, taken as zero
+  std::vector<flight::Vec3<double>> omega_rate;  ///< ω̇ [rad/s²]; empty likewise
+  std::vector<flight::Vec3<double>> turned;      ///< ∫ ω dt as a rotation vector [rad]; empty likewise
 };
 
 /// A fall as it begins.
@@ -60,8 +61,8 @@ struct FallStart {
 
 /// The body at the samples, with the effects that `values` names: the vertical turns against the body, and
 /// v̇ = −g + a(v u)·u by Heun's method from sample to sample. `gravity` g [m/s²]. Instantiated for double and
-/// Dual. Throws std::invalid_argument where `omega` or `turned` is of another size than `time`, and not
-/// empty.
+/// Dual. Throws std::invalid_argument where `omega`, `omega_rate` or `turned` is of another size than `time`,
+/// and not empty.
 template <class S>
 std::vector<FallingBody<S>> falling_bodies(const FallStart<S>& start, const FallSamples& samples,
                                            double gravity, const dynamics::Values<S>& values);

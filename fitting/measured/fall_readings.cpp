@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "dynamics/quantisation.hpp"
+#include "dynamics/spline_fit.hpp"
 #include "dynamics/third_difference.hpp"
 #include "dynamics/white_noise.hpp"
 #include "flight/quaternion.hpp"
@@ -31,6 +32,27 @@ double scatter_of(const std::vector<Vec3<double>>& x, std::size_t axis) {
     variances.push_back(
         dynamics::third_difference_variance(x[i - 3][axis], x[i - 2][axis], x[i - 1][axis], x[i][axis]));
   return dynamics::typical_rms(variances);
+}
+
+/// ω and ω̇ become those of the spline with as few knots as the gyroscope's noise allows. (Differences from
+/// sample to sample would be noise more than ω̇, and a lever arm fitted to them too short.)
+void smooth_turns(experiment::FallSamples& samples) {
+  constexpr std::size_t kLeast = 8;  // samples; a piece of the spline has six coefficients
+  auto& [time, omega, omega_rate, turned] = samples;
+  if (omega.size() < kLeast) return;
+  std::vector<double> rows;
+  for (const auto& row : omega) rows.insert(rows.end(), row.begin(), row.end());
+  dynamics::SplineProblem<3, 5> problem;
+  problem.begin = time.front(), problem.end = time.back();
+  auto& read = problem.observations.emplace_back();
+  read.time = time, read.value = rows;
+  for (std::size_t a = 0; a < 3; ++a) read.sigma[a] = std::max(scatter_of(omega, a), 1e-9);
+  const auto polynomial = dynamics::fit_spline(problem).polynomial;
+  for (std::size_t i = 0; i < time.size(); ++i) {
+    const auto at = polynomial.at({problem.begin, problem.end}, time[i]);
+    omega[i] = at.value;
+    omega_rate.push_back(at.first);
+  }
 }
 
 /// Why an axis says nothing of a fall, or nothing. One of a single value does not, unless that is all that
@@ -103,7 +125,7 @@ BeforeFall before_fall(const datasets::ImuLog& imu, std::size_t first, double gr
 FallReadings readings_of(const datasets::Throw& one) {
   const auto& imu = *one.imu;
   FallReadings out;
-  auto& [time, omega, turned] = out.samples;
+  auto& [time, omega, omega_rate, turned] = out.samples;
   for (std::size_t i = 0; i < imu.time.rows; ++i) {
     if (!falls_at(one, imu.time(i))) continue;
     if (!out.first) out.first = i;
@@ -118,6 +140,7 @@ FallReadings readings_of(const datasets::Throw& one) {
                                           (omega.back()[a] + omega[omega.size() - 2][a]);
     turned.push_back(angle);
   }
+  smooth_turns(out.samples);
   return out;
 }
 

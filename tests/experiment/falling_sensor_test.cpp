@@ -115,7 +115,7 @@ TEST(FallingSensor, TheVerticalTurnsAgainstTheBody) {
 }
 
 TEST(FallingSensor, OneSampleHasARateAndSizesAgree) {
-  FallSamples one{{0}, {{0, 0, 4}}, {{0, 0, 0}}};
+  FallSamples one{{0}, {{0, 0, 4}}, {}, {{0, 0, 0}}};
   const Named named{{"sensor.lever_arm.x", 0.1}};
   const auto f = readings({0, {0, 0, 1}, {}}, one, named);
   ASSERT_EQ(f.size(), 1U);
