@@ -71,7 +71,7 @@ class GivingPoints {
     S length;         ///< L(f_N) [m] at the end
     Inertia inertia;  ///< N
     Slip free;        ///< the slip at the end without the points' wrench
-    Slip known;       ///< the slip by which friction depends on speed
+    Slip known;       ///< the slip as it is expected: for friction by speed, and springs at their limits
   };
   /// From `from` to `to` (not the same); `slip` is the first guess and the answer, `wrench` [N, N, N m] what
   /// acts on the object at the end. False if the iteration spends its budget.
@@ -132,7 +132,7 @@ class GivingPoints {
   SpeedDependence<S> speed_;
   std::vector<double> limit_;                              ///< how far the springs reach [m], in this step
   std::vector<typename Stretch<S>::Gradient> limit_dual_;  ///< empty where S is double
-  Stretch<S> led_;
+  Stretch<S> led_;                                         ///< what led_to_limit() gives
 };
 
 extern template class GivingPoints<double>;

@@ -94,17 +94,12 @@ class Stepper {
              Moving<S>& to) {
     return stage(gain, scene, from.relative, from.stretch, known, to);
   }
-  /// To y2, where y1 is known.
+  /// To y2, where y1 is `first`.
   bool second(const S& gain, const Scene<S>& scene, const Moving<S>& from, const Moving<S>& first,
-              Moving<S>& to) {
+              const Relative<S>& known, Moving<S>& to) {
     constexpr double kAgain = (1 - kGamma) / kGamma;
     contact::GivingPoints<S>::mix(1 - kAgain, from.stretch, kAgain, first.stretch, base_);
-    return stage(gain, scene, mixed(1 - kAgain, from.relative, kAgain, first.relative), base_,
-                 straight_on(from, first), to);
-  }
-  /// What y2 would be on the straight line through y0 and y1.
-  static Relative<S> straight_on(const Moving<S>& from, const Moving<S>& first) {
-    return mixed(1 - 1 / kGamma, from.relative, 1 / kGamma, first.relative);
+    return stage(gain, scene, mixed(1 - kAgain, from.relative, kAgain, first.relative), base_, known, to);
   }
 
  private:
@@ -258,9 +253,10 @@ class GivingRelease {
     const S h = next - t_, gain = kGamma * h;
     const double ahead = length_ > 0 ? kGamma / (1 - kGamma) * value_of(h) / length_ : 0;
     const Relative<S> known = mixed(1 + ahead, at_.relative, -ahead, before_);
-    const bool solved = stepper_.first(gain, scenes_.scene(window_, t_ + gain), at_, known, stage_) &&
-                        stepper_.second(gain, there, at_, stage_, next_);
-    const Relative<S> bent = mixed(1, next_.relative, -1, Stepper<S>::straight_on(at_, stage_));
+    const bool first = stepper_.first(gain, scenes_.scene(window_, t_ + gain), at_, known, stage_);
+    const Relative<S> straight_on = mixed(1 - 1 / kGamma, at_.relative, 1 / kGamma, stage_.relative);
+    const bool solved = first && stepper_.second(gain, there, at_, stage_, straight_on, next_);
+    const Relative<S> bent = mixed(1, next_.relative, -1, straight_on);
     return {solved, size(bent, body_) / (4 * kGamma * (1 - kGamma))};
   }
   void accept(const S& next, const Scene<S>& there) {

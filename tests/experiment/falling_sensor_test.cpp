@@ -114,12 +114,18 @@ TEST(FallingSensor, TheVerticalTurnsAgainstTheBody) {
   }
 }
 
-TEST(FallingSensor, OneSampleHasARateAndSizesAgree) {
+TEST(FallingSensor, OneSampleTurnsAndSizesAgree) {
   FallSamples one{{0}, {{0, 0, 4}}, {}, {{0, 0, 0}}};
   const Named named{{"sensor.lever_arm.x", 0.1}};
   const auto f = readings({0, {0, 0, 1}, {}}, one, named);
   ASSERT_EQ(f.size(), 1U);
   expect_near(f[0], {-0.1 * 16, 0, 0}, 1e-12, 0);  // ω × (ω × r), towards the axis
+  one.omega_rate = {{0, 0, 5}};
+  expect_near(readings({0, {0, 0, 1}, {}}, one, named)[0], {-0.1 * 16, 0.1 * 5, 0}, 1e-12,
+              0);  // ω̇ × r beside it
+  one.omega_rate.push_back({0, 0, 5});
+  EXPECT_THROW(readings({0, {0, 0, 1}, {}}, one, named), std::invalid_argument);
+  one.omega_rate.clear();
   one.turned.clear();
   one.omega.push_back({0, 0, 4});
   EXPECT_THROW(readings({0, {0, 0, 1}, {}}, one, named), std::invalid_argument);

@@ -44,6 +44,26 @@ TEST(FallReadings, ASteadySpinTurnsByItselfTimesTheFall) {
   EXPECT_NEAR(turned[2], 0.9, 1e-9);
 }
 
+// A gyroscope's noise of 0.002 rad/s at 100 Hz is 0.14 rad/s² in a difference over two samples.
+TEST(FallReadings, RatesOfTurnsAreNotItsNoise) {
+  std::mt19937_64 random(91);
+  std::normal_distribution<double> noise(0, 0.002);
+  datasets::Throw one;
+  one.imu = recorded(10.0, 10.6, [](double) { return Vec3<double>{0, 0, 0}; });
+  one.free_flight = {10.0, 10.6};
+  constexpr double kPhase[] = {0, 1, 2};
+  for (std::size_t i = 0; i < one.imu->time.rows; ++i)
+    for (std::size_t a = 0; a < 3; ++a)
+      one.imu->angular_rate(i, a) = 2 * std::sin(3 * (one.imu->time(i) - 10) + kPhase[a]) + noise(random);
+  const auto samples = readings_of(one).samples;
+  ASSERT_EQ(samples.omega_rate.size(), samples.time.size());
+  double square = 0;
+  for (std::size_t i = 0; i < samples.time.size(); ++i)
+    for (std::size_t a = 0; a < 3; ++a)
+      square += std::pow(samples.omega_rate[i][a] - 6 * std::cos(3 * samples.time[i] + kPhase[a]), 2);
+  EXPECT_LT(std::sqrt(square / (3 * static_cast<double>(samples.time.size()))), 0.03);
+}
+
 // The sensor reads 10 m/s² at rest, bias included; a push that reads 15 m/s² for a fifth of a second leaves
 // at 1 m/s, whatever gravity is.
 TEST(FallReadings, SpeedIsWhatAPushReadsAboveRest) {
