@@ -19,7 +19,7 @@ struct IntegratorOptions {
   /// measured ones).
   Tolerances tolerances;
   /// Guards are sampled at least every third of this [s], and through the cubic in between: two roots closer
-  /// than about a ninth of it may be missed.
+  /// than a third of it may be missed, or than about a ninth where the guard is nearly a cubic.
   double guard_interval{5e-3};
   double longest_step{0.05};   ///< [s]; steps with guards are no longer than sixteen guard intervals
   long step_budget{200'000};   ///< steps in all, before the answer is `step_budget_spent`

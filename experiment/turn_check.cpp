@@ -25,31 +25,43 @@ double turns(double angle) {
   return std::abs(angle - n * kTurn) < 1 ? n : 0;
 }
 
-/// In words, where the angles of a series first jump.
-std::optional<std::string> jump_of(double clock_origin, const datasets::Series& time,
-                                   const datasets::Series& pose,
-                                   const std::function<bool(std::size_t)>& valid) {
-  constexpr double kApart = 0.1;  // [s]: farther apart, the rate before says little
-  std::optional<std::size_t> last;
-  double rate = 0;
+/// What is wrong with a throw, and what might be the cause.
+struct Oddity {
+  std::string what, hint;
+};
+using Found = std::optional<Oddity>;
+constexpr const char* kUnwrapped = "angles are logged unwrapped, without jumps of whole turns";
+
+/// Where the angles of a series first jump.
+Found jump_of(double clock_origin, const datasets::Series& time, const datasets::Series& pose,
+              const std::function<bool(std::size_t)>& valid) {
+  constexpr double kApart = 0.1;      // [s]: farther apart, the rate before says little
+  constexpr double kBaseline = 0.01;  // [s]: over less than this, noise and uneven stamps make any rate
+  std::vector<std::size_t> seen;
+  std::size_t from = 0;  // in `seen`: where the rate begins
   for (std::size_t i = 0; i < time.rows; ++i) {
     if (!valid(i)) continue;
-    if (last) {
-      const double dt = time(i) - time(*last), step = pose(i, 2) - pose(*last, 2);
+    if (!seen.empty()) {
+      const std::size_t last = seen.back();
+      while (from + 1 < seen.size() && time(last) - time(seen[from + 1]) >= kBaseline) ++from;
+      const double dt = time(i) - time(last), step = pose(i, 2) - pose(last, 2),
+                   baseline = time(last) - time(seen[from]);
+      const double rate = baseline >= kBaseline ? (pose(last, 2) - pose(seen[from], 2)) / baseline : 0;
       if (const double n = dt < kApart ? turns(step - rate * dt) : 0; n != 0)
-        return fmt::format(
-            "theta goes from {:.4g} to {:.4g} rad within {:.3g} s (to t = {:.15g} s), a jump of {} turn{}",
-            pose(*last, 2), pose(i, 2), dt, std::round((clock_origin + time(i)) * 1e5) / 1e5, std::abs(n),
-            std::abs(n) == 1 ? "" : "s");
-      rate = step / dt;
+        return Oddity{
+            fmt::format("theta goes from {:.4g} to {:.4g} rad within {:.3g} s (to t = {:.15g} s), a jump of "
+                        "{} turn{}",
+                        pose(last, 2), pose(i, 2), dt, std::round((clock_origin + time(i)) * 1e5) / 1e5,
+                        std::abs(n), std::abs(n) == 1 ? "" : "s"),
+            kUnwrapped};
     }
-    last = i;
+    seen.push_back(i);
   }
   return {};
 }
 
-/// In words, how far a landing's angle is from where the track leads.
-std::optional<std::string> landing_off(const datasets::Throw& one) {
+/// How far a landing's angle is from where the track leads.
+Found landing_off(const datasets::Throw& one) {
   constexpr double kGap = 0.3;  // [s]
   const auto& landing = *one.landing;
   if (landing.time.empty() || !tells_angle(landing)) return {};
@@ -58,26 +70,29 @@ std::optional<std::string> landing_off(const datasets::Throw& one) {
   const double expected = dynamics::fit_line(track->time, track->theta).at(landing.time(0)),
                off = landing.pose(0, 1) - expected;
   if (!(std::abs(off) > 0.5 * kTurn)) return {};
-  return fmt::format("theta is {:.4g} rad, and the track before leads to {:.4g} rad, {:.2g} turns from it",
-                     landing.pose(0, 1), expected, std::abs(off) / kTurn);
+  return Oddity{
+      fmt::format("theta is {:.4g} rad, and the track before leads to {:.4g} rad, {:.2g} turns from it",
+                  landing.pose(0, 1), expected, std::abs(off) / kTurn),
+      turns(off) != 0 ? kUnwrapped
+                      : "that is no whole turn: are x and theta in each other's place, is the landing of "
+                        "another throw, or did the tracker take the object the other way round?"};
 }
-
-using Found = std::optional<std::string>;
 
 /// One doubt of a dataset, if `off` has words for any throw.
 std::vector<UnitDoubt> first_found(const datasets::ThrowLog& log, const char* where,
                                    const std::function<Found(const datasets::Throw&)>& off) {
   UnitDoubt doubt{"", "theta", 1, 0, ""};
+  std::string hint;
   if (log.dimension != 2) return {};
   for (const auto& one : log.throws) {
     const Found found = off(one);
     if (!found || doubt.throws++ > 0) continue;
     doubt.path = fmt::format("/throws/{}/{}", one.id, where);
-    doubt.reason = *found;
+    doubt.reason = found->what, hint = found->hint;
   }
   if (doubt.throws == 0) return {};
   if (doubt.throws > 1) doubt.reason += fmt::format("; so in {} throws in all", doubt.throws);
-  doubt.reason += ": angles are logged unwrapped, without jumps of whole turns";
+  doubt.reason += ": " + hint;
   return {doubt};
 }
 

@@ -29,6 +29,21 @@ void add_footings(const FootprintColumns& columns, const CampaignProblem& proble
     if (one.n > 0 && one.misfit() > 0) to.push_back(std::move(one));
 }
 
+/// The spreads of a fit's throws for the same throws and others beside them, which may show another own
+/// unknown.
+std::vector<double> spreads_for(const CampaignProblem& problem, const CampaignProblem& fitted,
+                                const FitResult& fit) {
+  std::vector<double> out;
+  for (const Unknown& u : problem.own()) {
+    const auto same = std::find_if(fitted.own().begin(), fitted.own().end(),
+                                   [&](const Unknown& other) { return other.name == u.name; });
+    out.push_back(same == fitted.own().end()
+                      ? u.prior_sigma.value_or(u.scale)
+                      : fit.own_spread[static_cast<std::size_t>(same - fitted.own().begin())]);
+  }
+  return out;
+}
+
 }  // namespace
 
 std::vector<WildGroup> wild_throws(const Stage& stage, const DiscoverOptions& options) {
@@ -78,7 +93,7 @@ std::vector<WildGroup> still_wild(const CampaignProblem& answer, const FitResult
   const CampaignProblem problem = all.with(answer.options().model, answer.options().effects);
   FitOptions own = options.fit;
   own.share = Share::all, own.all_fixed = true, own.throws.clear();
-  own.start = carried(fitted, problem), own.own_spread = fitted.own_spread;
+  own.start = carried(fitted, problem), own.own_spread = spreads_for(problem, answer, fitted);
   const FitResult every = fit(problem, own);
   if (!every.is_answer()) return wild;
   std::vector<GroupFooting> footings;

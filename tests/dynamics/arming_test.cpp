@@ -93,8 +93,7 @@ TEST_P(Arming, AnEvenRootIsAGrazingAndNotAnEvent) {
 }
 
 TEST_P(Arming, APeakOfRoundingOnlyTouches) {
-  // 1e-7 of what the guard changes by from sample to sample: at a sample (there are four in 0.03 s) or
-  // between two.
+  // 1e-7 of what the guard changes by from sample to sample: at a sample (each 0.01 s) or between two.
   auto o = options();
   o.longest_step = o.guard_interval = 0.03;
   for (const double touch : {0.51, 0.52, 0.53, 0.54, 0.515, 0.5271}) {
@@ -102,8 +101,79 @@ TEST_P(Arming, APeakOfRoundingOnlyTouches) {
         {{"touch", Crossing::rising}}, still(),
         [touch](int, const auto& t, const auto&, auto* g) { g[0] = 1e-11 - (t - touch) * (t - touch); },
         FlowKind::frozen);
-    EXPECT_EQ(run(clock, {1.0, 0.0}, 1.0, o).outcome, Outcome::horizon) << touch;
+    const auto end = run(clock, {1.0, 0.0}, 0.9, o);  // in steps of 0.03 s
+    EXPECT_EQ(end.outcome, Outcome::horizon) << touch;
+    EXPECT_EQ(end.statistics.grazings, 1) << touch;
   }
+}
+
+TEST_P(Arming, APeakBelowZeroIsNoGrazing) {
+  for (const double below : {1e-2, 1e-4}) {  // of what the guard changes by over a stretch
+    const auto clock =
+        until_guard({{"near", Crossing::rising}}, still(), [below](int, const auto& t, const auto&, auto* g) {
+          g[0] = -below * 1e-5 - (t - 0.5023) * (t - 0.5023);
+        });
+    const auto end = run(clock, {1.0, 0.0}, 1.0, options());
+    EXPECT_EQ(end.outcome, Outcome::horizon) << below;
+    EXPECT_EQ(end.statistics.grazings, 0) << below;
+  }
+}
+
+TEST_P(Arming, TwoRootsInsideOneStepAreSeenHoweverShortTheStep) {
+  // Steps shorter than a third of the guard interval are sampled at their ends alone, unless the past says
+  // that the guard may rise in between.
+  auto o = options();
+  for (const double step : {0.15, 0.3, 0.5, 0.9}) {
+    o.longest_step = step * o.guard_interval;
+    for (const double width : {0.34, 0.6})
+      for (int k = 0; k < 20; ++k) {
+        const double half = 0.5 * width * o.guard_interval, middle = 0.04 + 0.053 * k * o.guard_interval;
+        const auto clock =
+            until_guard({{"bump", Crossing::rising}}, still(), [=](int, const auto& t, const auto&, auto* g) {
+              using std::exp;
+              const auto u = (t - middle) / half;
+              g[0] = exp(-u * u) - std::exp(-1.0);
+            });
+        const auto end = run(clock, {1.0, 0.0}, 0.06, o);
+        EXPECT_EQ(end.outcome, Outcome::finished) << step << " " << width << " " << k;
+        EXPECT_NEAR(end.t, middle - half, kEventTime) << step << " " << width << " " << k;
+      }
+  }
+}
+
+TEST_P(Arming, APairOfRootsAfterTheGuardHasBecomeSafeInTheSameStretchIsSeen) {
+  // Unsafe at the start, safe from a quarter of the stretch on, and unsafe for an instant between its last
+  // samples.
+  auto o = options();
+  const double stretch = o.guard_interval;
+  const auto clock =
+      until_guard({{"cubic", Crossing::rising}}, still(), [=](int, const auto& t, const auto&, auto* g) {
+        const auto u = t / stretch;
+        g[0] = -(u - 0.25) * (u - 0.75) * (u - 0.92);
+      });
+  const auto end = run(clock, {1.0, 0.0}, stretch, o);
+  EXPECT_EQ(end.outcome, Outcome::finished);
+  EXPECT_NEAR(end.t, 0.75 * stretch, kEventTime);
+}
+
+TEST_P(Arming, AGuardThatBecameSafeInTheStretchOfAnEventFiresWithIt) {
+  // Both pass zero at the same instant; the second has been unsafe at the beginning of the stretch.
+  const double stretch = options().guard_interval, root = 0.9 * stretch;
+  const Toy two(
+      {{FlowKind::smooth, {{"line", Crossing::rising}, {"parabola", Crossing::rising}}}}, still(),
+      [=](int, const auto& t, const auto& y, auto* g) {
+        g[0] = (t - root) / stretch - y[1];
+        g[1] = (t - 0.2 * stretch) * (t - root) / (stretch * stretch);
+      },
+      [](int, int, const auto& t, const auto& y) {
+        using S = std::decay_t<decltype(t)>;
+        return Entry<S, 2>{0, t, {y[0], S(y[1] + 1.0)}, S(0)};
+      });
+  const auto end = run(two, {1.0, 0.0}, stretch, options());
+  ASSERT_EQ(end.events.size(), 2u);
+  EXPECT_EQ(end.events[0].index, 0);
+  EXPECT_EQ(end.events[1].index, 1);
+  for (const auto& event : end.events) EXPECT_NEAR(event.t, root, kEventTime);
 }
 
 TEST_P(Arming, ANormAsAGuardEndsTyped) {

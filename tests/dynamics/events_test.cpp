@@ -154,7 +154,7 @@ TEST_P(Events, ATimeEventCloserToTheHorizonThanTimeResolves) {
 
 TEST_P(Events, TimeEventsAreReachedExactlyAndKeepTheirPlaceInTheList) {
   auto swing = Toy({{FlowKind::smooth, {}}}, oscillator(), no_guards(), enter(0));
-  swing.times = {-1.0, 0.0, 0.1, 1e-16 + 0.1, 0.3, 2.0};
+  swing.times = {-1.0, 0.0, 0.1, 1e-16 + 0.1, 0.3, 1.0, 2.0};  // the end is none of them
   const auto end = run(swing, {1.0, 0.0}, 1.0, options());
   ASSERT_EQ(end.events.size(), 3u);
   EXPECT_EQ(end.events[0].t, 0.1);
@@ -186,6 +186,29 @@ TEST_P(Events, TheRecordBeginsAtTheStartItself) {
   EXPECT_EQ(end.trajectory.at(kStart)[1], 0.0);
   EXPECT_NEAR(end.trajectory.at(kStart + kLead)[1], -kLead, 1e-12);
   EXPECT_NEAR(end.trajectory.at(0.8)[0], std::cos(0.3), 1e-8);
+}
+
+/// What a transition knows in closed form ends with the window; the event stays where it was.
+TEST_P(Events, ALeadThatReachesPastATimeEventEndsThere) {
+  constexpr double kEvent = 0.5, kLead = 1e-3, kWindow = kEvent + 4e-4;
+  auto swing = Toy(
+      {{FlowKind::smooth, {{"half", Crossing::rising}}}, {FlowKind::smooth, {}}}, oscillator(),
+      [=](int, const auto& t, const auto&, auto* g) { g[0] = t - kEvent; },
+      [=](int, int, const auto& t, const auto&) {
+        using S = std::decay_t<decltype(t)>;
+        using std::cos;
+        using std::sin;
+        const S ahead = t + kLead;
+        return Entry<S, 2>{1, ahead, {cos(ahead), -sin(ahead)}, S(kLead), {cos(t), -sin(t)}};
+      });
+  swing.times = {kWindow};
+  const auto end = run(swing, {1.0, 0.0}, 1.0, options());
+  ASSERT_EQ(end.events.size(), 2u);
+  EXPECT_NEAR(end.events[0].t, kEvent, kEventTime);
+  EXPECT_NEAR(end.events[0].y[0], std::cos(kEvent), 1e-9);
+  EXPECT_EQ(end.events[1].t, kWindow);
+  // Back from the lead's end to the window's along a straight line, which a curvature of one bends by 2e-7.
+  EXPECT_NEAR(end.y[0], std::cos(1.0), 2.5e-7);
 }
 
 // ------------------------------------------------------------------ Coulomb friction with a true stick mode

@@ -80,6 +80,19 @@ TEST(UnitCheck, TellsOfAnglesThatAreWholeTurnsOff) {
     EXPECT_EQ(told.path, "/throws/" + log.throws[3].id + "/hand/pose") << told.reason;
     EXPECT_THAT(told.reason, HasSubstr("a jump of"));
   }
+
+  log = campaign();
+  log.throws[3].landing->pose(0, 1) += 0.53 * kTurn;
+  EXPECT_THAT(doubt_of(log).reason, AllOf(HasSubstr("no whole turn"), Not(HasSubstr("unwrapped"))));
+}
+
+// Stamps of frames that come in bursts: between two the angle changes by its noise, within next to no time.
+TEST(UnitCheck, UnevenStampsAreNoTurns) {
+  auto log = campaign();
+  for (auto& one : log.throws)
+    for (std::size_t i = 1; i < one.mocap->time.rows; i += 2)
+      one.mocap->time.data[i] = one.mocap->time(i - 1) + 1e-6;
+  for (const auto& doubt : unit_doubts(log)) EXPECT_THAT(doubt.reason, Not(HasSubstr("turn"))) << doubt.path;
 }
 
 struct Mistake {

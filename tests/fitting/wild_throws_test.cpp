@@ -55,6 +55,24 @@ TEST(WildThrows, AWildThrowIsSetAsideAndNamed) {
   }
 }
 
+// With them the log shows an own unknown (where across its axis the pads hold an object) that it does not
+// show without.
+TEST(WildThrows, RobotsThatStoodStillAreSetAside) {
+  auto log = support::loop_campaign({{"flight.quadratic_drag.k", 0.01}});
+  for (const std::size_t k : {4U, 9U}) {
+    datasets::HandLog& hand = *log.throws[k].hand;
+    for (std::size_t i = 0; i < hand.pose.rows; ++i)
+      for (std::size_t c = 0; c < 3; ++c) {
+        hand.pose(i, c) = hand.pose(0, c);
+        hand.twist(i, c) = hand.acceleration(i, c) = 0;
+      }
+  }
+  const Discovery found = found_in(log);
+  EXPECT_EQ(found.skipped.size(), 2U);
+  EXPECT_EQ(found.effects.size(), 1U);
+  support::expect_size(found, "flight.quadratic_drag", 0.01);
+}
+
 // Repetitions that the pads hold at other places across the object's axis: each throw is fitted its own.
 TEST(WildThrows, AGraspThatScattersAcrossThePadsHidesNothing) {
   const auto found_with = [](const experiment::EffectSettings& effects) {
