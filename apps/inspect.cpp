@@ -24,6 +24,10 @@
 namespace unhand::apps {
 namespace {
 
+Json note_json(const experiment::LogNote& note) {
+  return {{"path", note.path}, {"reason", note.said}, {"throws", note.throws}};
+}
+
 struct InspectOptions {
   std::string log;
   std::string json;
@@ -216,11 +220,17 @@ Inspection inspect_throws(const std::string& file) {
   json["impossible_times"] = Json::array();
   for (const auto& note : experiment::impossible_times(log)) {
     out.text += fmt::format("note: {}\n", note.in_words(log.throws.size()));
-    json["impossible_times"].push_back({{"path", note.path}, {"reason", note.said}, {"throws", note.throws}});
+    json["impossible_times"].push_back(note_json(note));
   }
   if (const auto rests = fitting::rests_on_faces(log); rests.is_doubtful())
     out.text += fmt::format("note: {}\n", rests.in_words());
-  const auto untared = experiment::untared_force(log);
+  const auto openings = experiment::force_openings(log);
+  json["force_notes"] = Json::array();
+  for (const auto& note : experiment::force_notes(log, openings)) {
+    out.text += fmt::format("note: {}\n", note.in_words(log.throws.size()));
+    json["force_notes"].push_back(note_json(note));
+  }
+  const auto untared = experiment::untared_force(openings);
   if (untared) out.text += fmt::format("note: {}\n", untared->in_words());
   json["untared_normal_force_N"] = untared ? Json(untared->level) : Json(nullptr);
   json["doubtful"] = Json::array();

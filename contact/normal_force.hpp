@@ -140,7 +140,9 @@ struct NormalForceSummary {
   /// 1 σ of it, > 0 and at most half the ramp [s]; NaN: no release, or none that was seen (a series that is
   /// zero from its first sample)
   double release_sigma{std::numeric_limits<double>::quiet_NaN()};
-  double tail_mean{};  ///< mean of the series after the release [N]: the sensor's bias, if it has one
+  double tail_mean{};   ///< mean of the series after the release [N]: the sensor's bias, if it has one;
+                        ///< without a later rise
+  double later_rise{};  ///< where the force rises again after its release: by how much at most [N]; else 0
   double tail_mean_sigma{
       std::numeric_limits<double>::infinity()};  ///< 1 σ of it [N]; infinite without samples there
 };
@@ -177,8 +179,10 @@ struct NormalForceFit {
 /// sensor cannot tell from a power is taken for one, and σ does not know of it. Of a ramp that ends steeply
 /// (p < 1) σ is too small, the more so the fewer samples the ramp has.
 ///
-/// Pads that touch once more after they have let go: where that stands out of the noise, the release is after
-/// it; else it is part of the tail, and `chi2_per_dof` alone shows it.
+/// A force that rises again by less than a quarter of its grip, once it has been at its tail's level for
+/// three samples: a sensor that rings, or pads that touch once more. The release is before it, `later_rise`
+/// tells it, and `chi2_per_dof` shows it. Pads that press again by more grip once more, and the release is
+/// after that.
 ///
 /// A curve that leaves the samples by a fifth of the largest (through spikes, or rubbish) is replaced by
 /// straight lines between them.

@@ -295,12 +295,36 @@ double chi2(const ForceSeries& s, const Ramp& ramp, std::size_t from, std::size_
   return sum;
 }
 
+double above_tail(const ForceSeries& s, double tail, double peak) {
+  return std::max(6.0 * s.sigma, 0.02 * (peak - tail));
+}
+
+std::size_t later_rise(const ForceSeries& measured, double tail, double peak) {
+  constexpr double kLower = 0.25;    // of the peak
+  constexpr std::size_t kLevel = 3;  // samples
+  const std::vector<double> calm = calmed(measured.value);
+  const double above = above_tail(measured, tail, peak), high = tail + kLower * (peak - tail);
+  std::size_t last = calm.size();  // the last sample of what is higher
+  while (last > 0 && calm[last - 1] < high) --last;
+  if (last == 0 || !(high > tail + above)) return calm.size();
+  std::size_t level = 0;  // samples since the force was last above the threshold
+  for (std::size_t k = last; k < calm.size(); ++k) {
+    if (calm[k] - tail <= above)
+      ++level;
+    else if (level >= kLevel)
+      return k;
+    else
+      level = 0;
+  }
+  return calm.size();
+}
+
 std::optional<Descent> last_descent(const ForceSeries& measured, double tail, double peak) {
   const std::vector<double> calm = calmed(measured.value);
   const ForceSeries s{measured.time, calm, measured.sigma};
   const auto n = static_cast<std::ptrdiff_t>(s.size());
   std::ptrdiff_t last = n - 1;
-  while (last >= 0 && s.value[last] - tail <= std::max(6.0 * s.sigma, 0.02 * (peak - tail))) --last;
+  while (last >= 0 && s.value[last] - tail <= above_tail(s, tail, peak)) --last;
   if (last < 0) return std::nullopt;
   double top = -kInfinity;
   std::ptrdiff_t first = last;

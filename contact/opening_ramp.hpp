@@ -76,6 +76,14 @@ struct Descent {
 };
 std::optional<Descent> last_descent(const ForceSeries&, double tail, double peak);
 
+/// By how much more than the tail a sample has to be to be none of it [N].
+double above_tail(const ForceSeries&, double tail, double peak);
+
+/// Where the series rises once more, by less than a quarter of `peak`, after it has been at `tail` for three
+/// samples or more: the first sample of the first such rise after the last descent from higher up. The number
+/// of samples where there is none. Sought as last_descent is.
+std::size_t later_rise(const ForceSeries&, double tail, double peak);
+
 /// The opening as measured: start, release and shape of its ramp, and which of its parts are what the model
 /// says. The release's variance [s²] is that of least squares with outliers weighted, times the number of
 /// samples over which their noise stays (1 + 2 Σ ρ_k of the residuals), half as much again where the samples

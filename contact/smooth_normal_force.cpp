@@ -313,6 +313,26 @@ NormalForceFit with_release(const ForceSeries& s, Opening o) {
   return fit;
 }
 
+// The samples before `rise`, at the tail where they are below it beyond doubt: pads do not pull, so the
+// sensor rings.
+std::vector<double> without_pull(const ForceSeries& s, std::size_t rise, double tail, double peak) {
+  std::vector<double> out(s.value.begin(), s.value.begin() + static_cast<std::ptrdiff_t>(rise));
+  for (double& f : out)
+    if (f < tail - above_tail(s, tail, peak)) f = tail;
+  return out;
+}
+
+// Takes the samples from `rise` on, after the release, into the summary of those before them.
+void add_later(std::span<const double> time, std::span<const double> value, std::size_t rise,
+               NormalForceSummary& u) {
+  double sum = u.chi2_per_dof * static_cast<double>(rise);
+  for (std::size_t k = rise; k < time.size(); ++k) {
+    sum += std::pow((value[k] - u.tail_mean) / u.sigma, 2);
+    u.later_rise = std::max(u.later_rise, value[k] - u.tail_mean);
+  }
+  u.chi2_per_dof = sum / static_cast<double>(time.size());
+}
+
 }  // namespace
 
 NormalForceFit smooth_normal_force(std::span<const double> time, std::span<const double> value, double sigma,
@@ -339,7 +359,14 @@ NormalForceFit smooth_normal_force(std::span<const double> time, std::span<const
     return std::abs(level) <= std::max(options.max_tail_bias * height, 5.0 * s.sigma);
   };
   if (!is_zero(tail, sorted.back())) return within(s, without_release(s));
-  const std::optional<Descent> descent = last_descent(s, tail, std::max(peak, 0.5 * sorted.back()));
+  const double highest = std::max(peak, 0.5 * sorted.back());
+  if (const std::size_t rise = later_rise(s, tail, highest); rise < n) {
+    const std::vector<double> pressed = without_pull(s, rise, tail, highest);
+    NormalForceFit before = smooth_normal_force(time.first(rise), pressed, sigma, options);
+    add_later(time, value, rise, before.summary);
+    return before;
+  }
+  const std::optional<Descent> descent = last_descent(s, tail, highest);
   // Pads that press lightly and never part are told by the mean, which knows the level better than a sample.
   const double mean = std::accumulate(value.begin(), value.end(), 0.0) / static_cast<double>(n);
   if (!descent && mean > s.sigma * std::max(2.0, 5.0 / std::sqrt(static_cast<double>(n))))

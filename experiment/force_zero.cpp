@@ -4,10 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
-#include "contact/normal_force.hpp"
 #include "dynamics/median.hpp"
 
 namespace unhand::experiment {
@@ -31,6 +32,82 @@ std::optional<contact::NormalForceSummary> opening_of_force(const datasets::Thro
   return {};
 }
 
+/// One oddity: in how many throws it is, and what the first one of them, or the worst, shows.
+class Tally {
+ public:
+  void add(std::string path, std::string said, double size = 0) {
+    if (note_.throws++ > 0 && !(size > size_)) return;
+    size_ = size, note_.path = std::move(path), note_.said = std::move(said);
+  }
+  void end(std::vector<LogNote>& notes) const {
+    if (note_.throws > 0) notes.push_back(note_);
+  }
+
+ private:
+  LogNote note_;
+  double size_{};
+};
+
+/// Where a column is clipped: the value at which it stands.
+std::optional<double> clipped_at(const datasets::Series& series, std::size_t column) {
+  constexpr std::size_t kStands = 8;  // samples in a row
+  constexpr double kAlike = 0.2;      // of the other samples: more are on a grid, or have no noise
+  if (series.rows < 2 * kStands) return {};
+  double low = series(0, column), high = low;
+  for (std::size_t i = 1; i < series.rows; ++i) {
+    low = std::min(low, series(i, column));
+    high = std::max(high, series(i, column));
+  }
+  if (!(high > low)) return {};
+  for (const double end : {high, low}) {
+    std::size_t run = 0, longest = 0, alike = 0, others = 0;
+    for (std::size_t i = 0; i < series.rows; ++i) {
+      run = series(i, column) == end ? run + 1 : 0;
+      longest = std::max(longest, run);
+      if (i == 0 || series(i, column) == end) continue;
+      ++others;
+      if (series(i, column) == series(i - 1, column)) ++alike;
+    }
+    if (longest >= kStands && static_cast<double>(alike) < kAlike * static_cast<double>(others)) return end;
+  }
+  return {};
+}
+
+/// The autocorrelation of a series' samples from `first` on, about their mean, by lag; empty where they are
+/// too few or all the same.
+std::vector<double> autocorrelation(const std::vector<double>& series, std::size_t first) {
+  constexpr std::size_t kFewest = 20;
+  if (series.size() < first + kFewest) return {};
+  std::vector<double> e(series.begin() + static_cast<std::ptrdiff_t>(first), series.end());
+  const double mean = std::accumulate(e.begin(), e.end(), 0.0) / static_cast<double>(e.size());
+  double squares = 0;
+  for (double& x : e) x -= mean, squares += x * x;
+  if (!(squares > 0)) return {};
+  std::vector<double> out;
+  for (std::size_t lag = 0; lag < e.size() / 2; ++lag)
+    out.push_back(std::inner_product(e.begin() + static_cast<std::ptrdiff_t>(lag), e.end(), e.begin(), 0.0) /
+                  squares);
+  return out;
+}
+
+/// What the samples of a normal force have in common after its release.
+struct Likeness {
+  double neighbours{}, period{};  // correlation [-]; of hum [s], 0 where they are not periodic
+};
+std::optional<Likeness> likeness(const datasets::FtLog& ft, double release) {
+  constexpr double kPeriodic = -0.4;  // correlation half a period on
+  const auto first = std::lower_bound(ft.time.data.begin(), ft.time.data.end(), release);
+  const auto rho =
+      autocorrelation(ft.normal_force.data, static_cast<std::size_t>(first - ft.time.data.begin()));
+  if (rho.size() < 2) return {};
+  Likeness out{rho[1], 0};
+  const auto least = std::min_element(rho.begin(), rho.end());
+  if (*least < kPeriodic)
+    out.period = 2 * static_cast<double>(least - rho.begin()) * (ft.time.data.back() - ft.time.data.front()) /
+                 static_cast<double>(ft.time.rows - 1);
+  return out;
+}
+
 }  // namespace
 
 std::string UntaredForce::in_words() const {
@@ -41,11 +118,25 @@ std::string UntaredForce::in_words() const {
       level, 100 * level / grip, grip, throws);
 }
 
-std::optional<UntaredForce> untared_force(const datasets::ThrowLog& log) {
-  if (log.dimension != 2) return {};
+ForceOpenings force_openings(const datasets::ThrowLog& log) {
+  ForceOpenings out;
+  for (const auto& one : log.throws) out.push_back(log.dimension == 2 ? opening_of_force(one) : std::nullopt);
+  return out;
+}
+
+ForceOpenings force_openings(const std::vector<PreparedThrow>& throws) {
+  ForceOpenings out;
+  for (const PreparedThrow& one : throws) {
+    const bool parts = one.normal_force && std::isfinite(one.force_fit.release_time);
+    out.push_back(parts ? std::optional(one.force_fit) : std::nullopt);
+  }
+  return out;
+}
+
+std::optional<UntaredForce> untared_force(const ForceOpenings& openings) {
   std::vector<double> levels, sigmas, grips;
-  for (const auto& one : log.throws)
-    if (const auto opening = opening_of_force(one)) {
+  for (const auto& opening : openings)
+    if (opening) {
       levels.push_back(opening->tail_mean);
       sigmas.push_back(opening->tail_mean_sigma);
       grips.push_back(opening->grip_force);
@@ -61,6 +152,61 @@ std::optional<UntaredForce> untared_force(const datasets::ThrowLog& log) {
                    1.2533 * scatter / std::sqrt(static_cast<double>(out.throws));  // of normal ones
   if (std::abs(out.level) <= kStandardErrors * median_error || std::abs(out.level) <= kOfGrip * out.grip)
     return {};
+  return out;
+}
+
+std::vector<LogNote> force_notes(const datasets::ThrowLog& log, const ForceOpenings& openings) {
+  constexpr std::size_t kFewest = 5;  // throws
+  constexpr double kAlike = 0.5;      // correlation
+  Tally rises, alike;
+  std::vector<Tally> clips(4);  // of the normal force, and of the wrench by column
+  std::vector<double> neighbours, periods;
+  std::vector<LogNote> out;
+  for (std::size_t i = 0; i < log.throws.size(); ++i) {
+    const auto& one = log.throws[i];
+    if (!one.ft || log.dimension != 2) continue;
+    const std::string path = "/throws/" + one.id + "/ft/";
+    const auto clip = [&](const datasets::Series& series, std::size_t column, Tally& clipped,
+                          const std::string& name) {
+      if (const auto end = clipped_at(series, column))
+        clipped.add(path + name,
+                    fmt::format("stands at {:.4g} {}, which it never passes: the end of the sensor's "
+                                "range? What is cut off there is missing in fits",
+                                *end, column == 2 ? "N m" : "N"));
+    };
+    clip(one.ft->normal_force, 0, clips[0], "normal_force");
+    constexpr const char* kColumns[] = {"wrench, fx", "wrench, fz", "wrench, tau"};
+    for (std::size_t c = 0; c < 3 && !one.ft->wrench.empty(); ++c)
+      clip(one.ft->wrench, c, clips[c + 1], kColumns[c]);
+    if (!openings[i]) continue;
+    if (const double rise = openings[i]->later_rise; rise > 0) {
+      rises.add(
+          path + "normal_force",
+          fmt::format(
+              "rises again by {:.3g} N ({:.2g} % of the grip) after the pads have parted: a sensor that "
+              "rings, or pads that touch once more? The object is taken for free from the first "
+              "release on",
+              rise, 100 * rise / openings[i]->grip_force),
+          rise);
+    } else if (const auto like = likeness(*one.ft, openings[i]->release_time)) {
+      neighbours.push_back(like->neighbours);
+      periods.push_back(like->period);
+      if (like->neighbours > kAlike) alike.add(path + "normal_force", "");
+    }
+  }
+  rises.end(out);
+  for (const Tally& clipped : clips) clipped.end(out);
+  if (neighbours.size() >= kFewest && dynamics::median(neighbours) > kAlike) {
+    alike.end(out);
+    const double rho = dynamics::median(neighbours), period = dynamics::median(periods);
+    out.back().said = fmt::format(
+        "neighbouring samples after the release are alike (correlation {:.2f}): {}", rho,
+        period > 0 ? fmt::format("hum of some {:.2g} Hz? It moves the release that is read off each throw",
+                                 1 / period)
+                   : std::string(
+                         "a low-pass filter? It delays and rounds the opening, and friction that is fitted "
+                         "follows it: log the force unfiltered, or with as fast a filter as the sensor has"));
+  }
   return out;
 }
 

@@ -1,10 +1,13 @@
-// Whether a normal force reads zero once the pads have let go.
+// What the force sensor shows of itself: whether it reads zero once the pads have let go, rings, clips, or is
+// filtered.
 #pragma once
 
 #include <optional>
 #include <string>
+#include <vector>
 
-#include "datasets/throw_log.hpp"
+#include "experiment/log_note.hpp"
+#include "experiment/prepared_throw.hpp"
 
 namespace unhand::experiment {
 
@@ -19,10 +22,26 @@ struct UntaredForce {
   std::string in_words() const;
 };
 
-/// The zero of the normal force of planar throws that land or are declared to fly (else pads may still
-/// press). Told is a level beyond five standard errors of the median (of a throw's own noise, or of how
-/// levels scatter from throw to throw) and half a per cent of the grip: friction that is fitted to slips
-/// follows the level with some ten times that share, since pads slip while the force is small.
-std::optional<UntaredForce> untared_force(const datasets::ThrowLog& log);
+/// How the pads open in each throw, by its normal force; none where that does not tell when they part, or
+/// where nothing says that they let go (no landing, no declared flight: they may still press).
+using ForceOpenings = std::vector<std::optional<contact::NormalForceSummary>>;
+ForceOpenings force_openings(const datasets::ThrowLog& log);
+/// The same of throws whose force has been smoothed.
+ForceOpenings force_openings(const std::vector<PreparedThrow>& throws);
+
+/// The zero of the normal force of planar throws. Told is a level beyond five standard errors of the median
+/// (of a throw's own noise, or of how levels scatter from throw to throw) and half a per cent of the grip:
+/// friction that is fitted to slips follows the level with some ten times that share, since pads slip while
+/// the force is small.
+std::optional<UntaredForce> untared_force(const ForceOpenings& openings);
+
+/// What of `ft` cannot be the pads' alone, a note each:
+/// - a normal force that rises again after its release (NormalForceSummary::later_rise);
+/// - a column that stands at its largest or smallest value for eight samples or more, though it has noise
+///   elsewhere: a sensor at the end of its range;
+/// - a normal force whose samples after the release are alike (correlation of neighbours, median over five
+/// throws
+///   or more, above a half): by a low-pass filter, or periodically, by hum.
+std::vector<LogNote> force_notes(const datasets::ThrowLog& log, const ForceOpenings& openings);
 
 }  // namespace unhand::experiment

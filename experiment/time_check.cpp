@@ -39,11 +39,6 @@ std::string jumps_outside(const ThrowLog& log, const Throw& one) {
 
 }  // namespace
 
-std::string TimeNote::in_words(std::size_t of) const {
-  return fmt::format("{}: {}{}", path, said,
-                     throws > 1 || of > 1 ? fmt::format("; so in {} of {} throws", throws, of) : "");
-}
-
 std::string landed_before(const ThrowLog& log, const Throw& one) {
   if (!one.landing || one.landing->time.empty()) return {};
   const double t = one.landing->time(0);
@@ -73,7 +68,7 @@ std::string clocks_apart(const ThrowLog& log, const Throw& one) {
       span_of(log, mocap), span_of(log, hand));
 }
 
-std::vector<TimeNote> impossible_times(const ThrowLog& log) {
+std::vector<LogNote> impossible_times(const ThrowLog& log) {
   struct Rule {
     const char* where;  ///< in a throw
     std::function<std::string(const Throw&)> said;
@@ -94,9 +89,9 @@ std::vector<TimeNote> impossible_times(const ThrowLog& log) {
       {"/landing/time", [&](const Throw& one) { return landed_before(log, one); }},
       {"/mocap/time", [&](const Throw& one) { return clocks_apart(log, one); }},
   };
-  std::vector<TimeNote> out;
+  std::vector<LogNote> out;
   for (const Rule& rule : rules) {
-    TimeNote note;
+    LogNote note;
     for (const Throw& one : log.throws) {
       const auto said = rule.said(one);
       if (said.empty()) continue;

@@ -13,6 +13,7 @@
 #include "dynamics/median.hpp"
 #include "dynamics/parallel.hpp"
 #include "experiment/compare.hpp"
+#include "experiment/force_zero.hpp"
 #include "experiment/glitches.hpp"
 #include "fitting/grasp_scatter.hpp"
 
@@ -92,6 +93,8 @@ CampaignProblem::CampaignProblem(const datasets::ThrowLog& logged, const std::st
   model_ = {options.model, options.pads.value_or(log.gripper ? log.gripper->n_pads : 2),
             options.reference_force.value_or(grips.empty() ? 20.0 : dynamics::median(grips)),
             options.integrator};
+  for (const auto& note : experiment::force_notes(log, experiment::force_openings(prepared)))
+    notes_.push_back(note.in_words(prepared.size()));
   if (!options.predict_only) guess_start(log, prepared, !grips.empty());
   if (const auto scatter = grasp_scatter_across(log, prepared); scatter.is_evident()) {
     scatters_across_ = true;

@@ -483,6 +483,41 @@ TEST(SmoothNormalForce, LaterGripsAndOddSeriesAreSurvived) {
   }
 }
 
+// A sensor that rings once it is unloaded, or pads that touch once more while the object leaves: the opening
+// is the one from the grip, and what comes later is told.
+TEST(SmoothNormalForce, ALaterRiseIsNotTheOpening) {
+  std::mt19937_64 random(27);
+  for (const double p : {1.0, 2.0})
+    for (const double height : {1.0, 2.0, 5.0}) {
+      const auto touches = [=](double t) {
+        const double s = (t - 0.105) / 0.006;
+        return ramp(t, 25.0, 0.02, 0.07, p) + (s > 0 && s < 1 ? height * std::sin(M_PI * s) : 0.0);
+      };
+      const auto rings = [=](double t) {
+        return ramp(t, 25.0, 0.02, 0.07, p) +
+               (t > 0.09 ? -height * std::exp(-(t - 0.09) / 0.02) * std::sin(2 * M_PI * 80 * (t - 0.09))
+                         : 0.0);
+      };
+      const Log clean = record([=](double t) { return ramp(t, 25.0, 0.02, 0.07, p); }, 0.05, random);
+      EXPECT_EQ(smooth_normal_force(clean.time, clean.value, 0.05).summary.later_rise, 0.0);
+      const Log log = record(touches, 0.05, random);
+      const NormalForceFit fit = smooth_normal_force(log.time, log.value, 0.05);
+      expect_sound(fit, log);
+      EXPECT_NEAR(fit.summary.release_time, 0.09, 6 * fit.summary.release_sigma) << p << " " << height;
+      EXPECT_LT(fit.summary.release_sigma, 1.5e-3);
+      EXPECT_NEAR(fit.summary.grip_force, 25.0, 0.05);
+      EXPECT_NEAR(fit.summary.tail_mean, 0.0, 0.05);
+      EXPECT_NEAR(fit.summary.later_rise, height, 0.2);
+      EXPECT_GT(fit.summary.chi2_per_dof, 2.0);
+
+      const Log rung = record(rings, 0.05, random);
+      const NormalForceFit within = smooth_normal_force(rung.time, rung.value, 0.05);
+      expect_sound(within, rung);
+      EXPECT_NEAR(within.summary.release_time, 0.09, 6e-3) << p << " " << height;
+      EXPECT_NEAR(within.summary.grip_force, 25.0, 0.1);
+    }
+}
+
 TEST(SmoothNormalForce, UndeclaredNoiseIsEstimated) {
   std::mt19937_64 random(27);
   const Log log = record([](double t) { return ramp(t, 25.0, 0.0575, 0.055, 1.0); }, 0.05, random);

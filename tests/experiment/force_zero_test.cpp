@@ -17,11 +17,11 @@ datasets::ThrowLog offset_log(double level) {
   return log;
 }
 
-TEST(ForceZero, ASensorThatWasTaredIsNotTold) { EXPECT_FALSE(untared_force(offset_log(0))); }
+TEST(ForceZero, ASensorThatWasTaredIsNotTold) { EXPECT_FALSE(untared_force(force_openings(offset_log(0)))); }
 
 TEST(ForceZero, TheLevelAfterThePadsHavePartedIsTheSensors) {
   for (const double level : {-0.5, 1.0, 8.0, 60.0}) {
-    const auto told = untared_force(offset_log(level));
+    const auto told = untared_force(force_openings(offset_log(level)));
     ASSERT_TRUE(told) << level;
     EXPECT_NEAR(told->level, level, 5 * told->sigma);
     EXPECT_GT(told->grip, level);
@@ -31,10 +31,10 @@ TEST(ForceZero, TheLevelAfterThePadsHavePartedIsTheSensors) {
 
 // What is plain in the noise may be too little of the grip to matter.
 TEST(ForceZero, AThousandthOfTheGripIsNotTold) {
-  const double grip = untared_force(offset_log(1))->grip;
+  const double grip = untared_force(force_openings(offset_log(1)))->grip;
   for (const double sign : {1.0, -1.0}) {
-    EXPECT_FALSE(untared_force(offset_log(sign * 0.001 * grip)));
-    EXPECT_TRUE(untared_force(offset_log(sign * 0.01 * grip)));
+    EXPECT_FALSE(untared_force(force_openings(offset_log(sign * 0.001 * grip))));
+    EXPECT_TRUE(untared_force(force_openings(offset_log(sign * 0.01 * grip))));
   }
 }
 
@@ -51,7 +51,7 @@ TEST(ForceZero, ZerosThatScatterFromThrowToThrowAreNoCommonOne) {
       const double zero = normal(random);
       for (double& f : one.ft->normal_force.data) f += zero;
     }
-    told += untared_force(log).has_value();
+    told += untared_force(force_openings(log)).has_value();
   }
   EXPECT_LE(told, 1);
 }
@@ -60,7 +60,7 @@ TEST(ForceZero, ZerosThatScatterFromThrowToThrowAreNoCommonOne) {
 TEST(ForceZero, PadsThatMayStillPressAreNoDoubt) {
   auto log = offset_log(1);
   for (auto& one : log.throws) one.landing.reset(), one.free_flight.reset();
-  EXPECT_FALSE(untared_force(log));
+  EXPECT_FALSE(untared_force(force_openings(log)));
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ const ThrowLog& small_log() {
 }
 
 auto note(const std::string& path, int throws) {
-  return testing::AllOf(Field(&TimeNote::path, path), Field(&TimeNote::throws, throws));
+  return testing::AllOf(Field(&LogNote::path, path), Field(&LogNote::throws, throws));
 }
 
 TEST(TimeCheck, ACampaignOfOnesOwnIsPossible) { EXPECT_THAT(impossible_times(small_log()), IsEmpty()); }
