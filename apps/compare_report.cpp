@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 
 #include "apps/cards.hpp"
 #include "apps/compare.hpp"

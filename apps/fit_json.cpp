@@ -1,6 +1,5 @@
 // The answer of `unhand fit` on throws, as JSON.
 #include <algorithm>
-#include <cmath>
 
 #include "apps/compare.hpp"
 #include "apps/fit.hpp"

@@ -1,9 +1,7 @@
 // What the sensors saw of a throw, as one list of numbers with their noise.
 #pragma once
 
-#include <array>
 #include <optional>
-#include <string>
 #include <string_view>
 #include <vector>
 

@@ -2,9 +2,7 @@
 #pragma once
 
 #include <array>
-#include <map>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <optional>
 
 #include "fitting/discovery/acceptance.hpp"
 #include "fitting/discovery/asked_form.hpp"

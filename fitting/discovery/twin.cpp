@@ -4,12 +4,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <limits>
 #include <optional>
 
 #include "contact/normal_force.hpp"
-#include "dynamics/parallel.hpp"
 #include "experiment/random_stream.hpp"
 #include "experiment/sample_window.hpp"
 

@@ -1,7 +1,6 @@
 #include "fitting/measured/effect_description.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "dynamics/dense_solve.hpp"
 #include "fitting/measured/grouped_footprints.hpp"

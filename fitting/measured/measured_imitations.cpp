@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "fitting/gross_outliers.hpp"
 #include "fitting/measured/effect_trial.hpp"
 #include "fitting/measured/grouped_weights.hpp"
-#include "fitting/measured/wild_groups.hpp"
 
 namespace unhand::fitting {
 

@@ -8,7 +8,6 @@
 #include "dynamics/dense_solve.hpp"
 #include "dynamics/parallel.hpp"
 #include "fitting/hat.hpp"
-#include "fitting/measured/grouped_weights.hpp"
 
 namespace unhand::fitting {
 

@@ -3,8 +3,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <map>
-#include <memory>
 #include <vector>
 
 #include "planners/flip/learner.hpp"
