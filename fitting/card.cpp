@@ -96,7 +96,7 @@ std::string in_words(const Condition& is, const CardRange& range) {
 }
 
 void widen(std::map<std::string, CardRange>& range, const experiment::PreparedThrow& prepared, Share share) {
-  if (share != Share::all && (prepared.split == datasets::Split::train) != (share == Share::train)) return;
+  if (!takes(share, prepared.split)) return;
   for (const auto& [name, unit, value] : conditions_of(prepared)) {
     auto& r = range.try_emplace(name, CardRange{value, value, unit}).first->second;
     r.low = std::min(r.low, value);
