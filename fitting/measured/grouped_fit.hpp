@@ -52,6 +52,8 @@ struct GroupedFit {
   int used{}, iterations{};              ///< groups
   /// Of the shared parameters.
   std::vector<std::string> names() const;
+  /// The places of the groups that took part and are solved.
+  std::vector<std::size_t> solved_groups() const;
   /// 1 σ of shared parameter k; from the covariance.
   double sigma(std::size_t k) const {
     return std::sqrt(covariance(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(k)));

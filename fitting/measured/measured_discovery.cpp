@@ -26,9 +26,8 @@ namespace {
 double without_strays(const GroupedProblem& problem, const GroupedFit& fit, std::size_t channel) {
   constexpr double kFar = 10, kFew = 0.01;
   std::vector<double> sizes;
-  for (std::size_t i = 0; i < fit.groups.size(); ++i) {
+  for (const std::size_t i : fit.solved_groups()) {
     const GroupFit& g = fit.groups[i];
-    if (!g.used || !g.solved) continue;
     for (Eigen::Index j = 0; j < g.residual.size(); ++j)
       if (problem.groups()[i].rows[static_cast<std::size_t>(j)].channel == static_cast<int>(channel))
         sizes.push_back(std::abs(g.residual[j]));

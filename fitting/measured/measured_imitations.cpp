@@ -112,8 +112,7 @@ std::vector<double> weighed_misfit(const GroupedProblem& problem, const GroupedF
 bool are_exceptions(const EffectSearch& search) {
   double all = 0, less = 0;
   for (const GroupedFit* fit : {&search.final, &search.final_test})
-    for (std::size_t i = 0; i < fit->groups.size(); ++i)
-      if (fit->groups[i].used && fit->groups[i].solved) all += 1, less += fit->weights.group[i] < 1 ? 1 : 0;
+    for (const std::size_t i : fit->solved_groups()) all += 1, less += fit->weights.group[i] < 1 ? 1 : 0;
   return less <= std::max(1.0, kMostWild * all);
 }
 

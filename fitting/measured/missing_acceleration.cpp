@@ -76,8 +76,7 @@ struct Seen {
 
 std::vector<Seen> seen_in(const GroupedProblem& problem, const GroupedFit& fit, int threads) {
   std::vector<Seen> out;
-  for (std::size_t i = 0; i < fit.groups.size(); ++i)
-    if (fit.groups[i].used && fit.groups[i].solved) out.push_back({i, {}, {}});
+  for (const std::size_t i : fit.solved_groups()) out.push_back({i, {}, {}});
   const auto names = fit.names();
   const std::vector<double> values(fit.values.data(), fit.values.data() + fit.values.size());
   dynamics::parallel_for(out.size(), threads, [&](std::size_t n) {
