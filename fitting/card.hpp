@@ -81,6 +81,11 @@ datasets::ModelCard card_of(const CampaignProblem& problem, const FitResult& fit
 /// estimate.
 bool is_fitted(const datasets::ModelCard& card);
 
+/// Throws datasets::CardError, naming `file`, for a parameter of a card in another unit or out of range.
+void require_parameter(const std::string& file, const std::string& name,
+                       const datasets::CardParameter& parameter, const std::string& unit, double low,
+                       double high);
+
 /// The problem's options that a fitted card asks for, to predict with it. Throws datasets::CardError, naming
 /// `file`, for a model, an effect or a parameter that this library lacks, a wrong unit or a value out of
 /// range.
