@@ -198,9 +198,6 @@ EffectSearch run_search(GroupedProblem& problem, const MeasuredOptions& options,
 }
 
 void weigh_conditions(const EffectSearch& search, MeasuredDiscovery& out) {
-  const auto stands = [&](const std::string& id) {
-    return std::any_of(out.effects.begin(), out.effects.end(), [&](const auto& e) { return e.id == id; });
-  };
   const auto is_told =
       [&](const SizeShift& s) {  // and not in other lengths, those of a scale that is gravity
         for (const auto& effect : out.effects)
@@ -218,7 +215,7 @@ void weigh_conditions(const EffectSearch& search, MeasuredDiscovery& out) {
            false});
       continue;
     }
-    if (!c.instead_of.empty() && !stands(c.instead_of)) continue;
+    if (!c.instead_of.empty() && !is_accepted(c.instead_of, out.effects)) continue;
     const std::string how =
         c.instead_of.empty()
             ? fmt::format("{} is evident beside it (BIC {:.1f}), though held-out groups do not confirm that",
@@ -263,11 +260,9 @@ std::vector<AskedBeside> asked_beside(const GroupedProblem& problem, const Group
 void weigh_drag_form(const GroupedProblem& problem, const EffectSearch& search,
                      const MeasuredOptions& options, MeasuredDiscovery& out) {
   const std::string quadratic = "flight.quadratic_drag", linear = "flight.linear_drag";
-  const auto has = [&](const std::string& id) {
-    return std::any_of(out.effects.begin(), out.effects.end(), [&](const auto& e) { return e.id == id; });
-  };
-  if (has(quadratic) == has(linear)) return;
-  const std::string &is = has(quadratic) ? quadratic : linear, &other = has(quadratic) ? linear : quadratic;
+  const bool squared = is_accepted(quadratic, out.effects);
+  if (squared == is_accepted(linear, out.effects)) return;
+  const std::string &is = squared ? quadratic : linear, &other = squared ? linear : quadratic;
   for (const auto& [parameter, value, sigma] : asked_beside(problem, search.final, other, options)) {
     const char* form = is == linear ? (value > 0 ? "grows faster than v" : "grows less than v")
                                     : (value > 0 ? "grows less than v²" : "grows faster than v²");

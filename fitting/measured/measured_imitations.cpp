@@ -103,8 +103,7 @@ bool leave_more_than_they_take(const std::vector<MeasuredMisfit>& misfit) {
 std::vector<double> weighed_misfit(const GroupedProblem& problem, const GroupedFit& fit,
                                    const GroupedWeights& weights) {
   std::vector<double> out;
-  for (const GroupedMisfit& m : misfit(problem, fit, &weights))
-    out.push_back(m.weight > 0 ? m.chi2 / m.weight : 0);
+  for (const GroupedMisfit& m : misfit(problem, fit, &weights)) out.push_back(m.chi2_per_sample());
   return out;
 }
 
