@@ -13,12 +13,6 @@
 
 namespace unhand::fitting {
 
-using experiment::Channel;
-
-bool is_wrench(Channel c) {
-  return c == Channel::wrench_fx || c == Channel::wrench_fz || c == Channel::wrench_tau;
-}
-
 bool Stage::is_fitted() const { return fit.is_answer(); }
 
 bool Stage::solved() const { return is_fitted() && held_out.is_answer(); }
