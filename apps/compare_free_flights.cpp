@@ -20,7 +20,6 @@ namespace {
 
 using datasets::Split;
 using experiment::FreeFlightComparison;
-using experiment::FreeFlightErrors;
 using experiment::FreeFlightOutcome;
 using experiment::FreeFlightStatistics;
 

@@ -19,7 +19,6 @@
 namespace unhand::fitting {
 
 using dynamics::Spectrum, dynamics::spectrum_of;
-using experiment::Channel;
 
 namespace {
 

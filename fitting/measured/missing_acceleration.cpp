@@ -11,8 +11,7 @@
 
 namespace unhand::fitting {
 
-using dynamics::definite_solve, dynamics::gram, dynamics::inner_products, dynamics::pseudo_inverse,
-    dynamics::product;
+using dynamics::gram, dynamics::inner_products, dynamics::pseudo_inverse, dynamics::product;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
