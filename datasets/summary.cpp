@@ -297,7 +297,7 @@ std::string to_json(const LogSummary& summary) {
     each.push_back({{"id", toss.id},
                     {"object", toss.object},
                     {"condition", toss.condition},
-                    {"split", toss.split == Split::train ? "train" : "test"},
+                    {"split", to_string(toss.split)},
                     {"landing", toss.landing},
                     {"channels", channels}});
   }
