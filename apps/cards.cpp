@@ -191,9 +191,9 @@ ModelCard card_of(const fitting::CampaignProblem& problem, const fitting::FitRes
                   const datasets::ThrowLog& log) {
   ModelCard card = fitting::card_of(problem, fit);
   card.log = log_of(log_file, log);
-  for (const auto& [split, name] :
-       {std::pair{datasets::Split::train, "train"}, {datasets::Split::test, "test"}})
-    if (auto found = fitting::errors_of(errors, split); !found.empty()) card.errors[name] = std::move(found);
+  for (const auto split : {datasets::Split::train, datasets::Split::test})
+    if (auto found = fitting::errors_of(errors, split); !found.empty())
+      card.errors[to_string(split)] = std::move(found);
   return card;
 }
 

@@ -20,17 +20,15 @@ namespace {
 
 using datasets::Split;
 using experiment::FreeFlightComparison;
-using experiment::FreeFlightErrors;
 using experiment::FreeFlightOutcome;
 using experiment::FreeFlightStatistics;
 
 struct SplitOf {
-  Split split;
   const char* name;
   const FreeFlightStatistics FreeFlightComparison::*statistics;
 };
-constexpr SplitOf kFlightSplits[] = {{Split::train, "train", &FreeFlightComparison::train},
-                                     {Split::test, "test", &FreeFlightComparison::test}};
+constexpr SplitOf kFlightSplits[] = {{"train", &FreeFlightComparison::train},
+                                     {"test", &FreeFlightComparison::test}};
 
 Json spread_json(const experiment::Spread& s) {
   if (s.n == 0) return {{"n", 0}, {"mean", nullptr}, {"median", nullptr}, {"std", nullptr}};
@@ -55,7 +53,7 @@ Json flights_json(const FreeFlightComparison& found, const CompareRequest& reque
   Json& one = out["models"][experiment::kProjectile];
   one["parameters"] = Json::object();
   one["failed"] = found.skipped;
-  for (const auto& [split, name, member] : kFlightSplits) {
+  for (const auto& [name, member] : kFlightSplits) {
     const FreeFlightStatistics& s = found.*member;
     one[name] = {{"n", s.n}, {"trajectory_rms_m", nullptr}};
     if (s.n > 0) one[name]["trajectory_rms_m"] = s.trajectory_rms_m;
@@ -71,7 +69,7 @@ Table flights_table(const FreeFlightComparison& found) {
              "end orientation [deg]", "median", "us/throw"},
             {},
             2};
-  for (const auto& [split, name, member] : kFlightSplits) {
+  for (const auto& [name, member] : kFlightSplits) {
     const FreeFlightStatistics& s = found.*member;
     const auto &p = s.end_position_error_m, &a = s.end_orientation_error_deg;
     out.rows.push_back({experiment::kProjectile, name, fmt::to_string(s.n),
@@ -90,9 +88,9 @@ Table flight_rows(const FreeFlightComparison& found) {
             4};
   for (const auto& one : found.each) {
     const bool fitted = one.outcome == FreeFlightOutcome::fitted;
-    out.rows.push_back({one.id, one.split == Split::train ? "train" : "test", experiment::kProjectile,
-                        to_string(one.outcome), fmt::to_string(one.whole.times.size()),
-                        all_digits(fitted, one.trajectory_rms), all_digits(fitted, one.end_position_error),
+    out.rows.push_back({one.id, to_string(one.split), experiment::kProjectile, to_string(one.outcome),
+                        fmt::to_string(one.whole.times.size()), all_digits(fitted, one.trajectory_rms),
+                        all_digits(fitted, one.end_position_error),
                         all_digits(one.end_orientation_error.has_value(),
                                    one.end_orientation_error.value_or(0) * experiment::kDegrees)});
   }

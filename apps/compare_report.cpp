@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 
 #include "apps/cards.hpp"
 #include "apps/compare.hpp"
@@ -18,8 +17,6 @@ namespace {
 
 using datasets::Split;
 using experiment::ModelComparison;
-
-constexpr std::pair<Split, const char*> kThrowSplits[] = {{Split::train, "train"}, {Split::test, "test"}};
 
 struct Count {
   int throws{}, failed{};
@@ -66,10 +63,10 @@ ReleaseTables release_tables(const experiment::Comparison& comparison, const dat
     out.bias.header.push_back(quantity.title);
   }
   out.errors.header.push_back("us/throw");
-  for (const auto& [split, name] : kThrowSplits) {
+  for (const Split split : {Split::train, Split::test}) {
     for (const auto& model : comparison.models) {
       const Count counted = count(model, split);
-      std::vector<std::string> row{model.model, name, fmt::to_string(counted.throws),
+      std::vector<std::string> row{model.model, to_string(split), fmt::to_string(counted.throws),
                                    fmt::to_string(counted.failed)};
       auto bias = row;
       for (int q = 0; q < experiment::kQuantityCount; ++q) {
@@ -144,7 +141,7 @@ Json release_json(const experiment::Comparison& comparison, const CompareRequest
                        {"scatter", model.estimate.scatter}};
     one["failed"] = model.failed;
     one["slips_at_start"] = slips_at_start(model);
-    for (const auto& [split, name] : kThrowSplits) one[name] = split_json(model, split);
+    for (const Split split : {Split::train, Split::test}) one[to_string(split)] = split_json(model, split);
     one["microseconds_per_throw"] = model.microseconds_per_throw;
   }
   return out;
@@ -164,7 +161,7 @@ Table throw_table(const experiment::Comparison& comparison, const datasets::Thro
       std::vector<std::string> row{one.id,
                                    one.object,
                                    one.condition,
-                                   one.split == datasets::Split::train ? "train" : "test",
+                                   to_string(one.split),
                                    model.model,
                                    outcome_of(p),
                                    all_digits(detached, p.detach.time + log.clock_origin),

@@ -84,7 +84,7 @@ Figure section_figure(const fitting::SlipSamples& slips, const std::vector<Surfa
       if (score.fit.fitted()) figure.data.push_back(curve(score.fit.surface, section));
     s += place(figure, {left, left + 7.6, bottom, top});
     s += fmt::format("set xlabel '{}'\nset ylabel '{}'\n", section.across_label, section.up_label);
-    s += fmt::format("plot ");
+    s += "plot ";
     if (!figure.data[data].rows.empty())
       s += fmt::format(
           "DATA index {0} using 1:2:3:4 with vectors nohead linecolor rgb '#808080' linewidth 0.8, \\\n     "

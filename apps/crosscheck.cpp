@@ -161,7 +161,7 @@ std::vector<Setting> run_engine(const CrosscheckOptions& options, const Throws& 
       integrator.tolerances = {1e-10, 1e-12};
       integrator.method = dynamics::Method::cvode;
       out.push_back(
-          {fmt::format("CVODE, tolerance 1e-10"), model, Json{{"rtol", 1e-10}, {"atol", 1e-12}},
+          {"CVODE, tolerance 1e-10", model, Json{{"rtol", 1e-10}, {"atol", 1e-12}},
            all(throws, options.threads, progress, [&, own = parameters_of(model, p)](const auto& one) {
              return experiment::predict(one, model, own, integrator);
            })});

@@ -17,7 +17,6 @@
 #include "apps/command.hpp"
 #include "apps/interruption.hpp"
 #include "apps/output.hpp"
-#include "release/naive_release.hpp"
 
 namespace unhand::apps {
 namespace {

@@ -1,6 +1,5 @@
 // The answer of `unhand fit` on throws, as JSON.
 #include <algorithm>
-#include <cmath>
 
 #include "apps/compare.hpp"
 #include "apps/fit.hpp"
@@ -59,7 +58,7 @@ Json throws_json(const FitAnswer& a) {
     Json own = Json::object();
     for (std::size_t k = 0; k < t.own.size(); ++k) own[a.problem.own()[k].name] = t.own[k];
     out.push_back({{"id", t.id},
-                   {"split", a.throws[i].comparison.split == Split::train ? "train" : "test"},
+                   {"split", to_string(a.throws[i].comparison.split)},
                    {"used", t.used},
                    {"why_not", t.why_not.empty() ? Json(nullptr) : Json(t.why_not)},
                    {"weight", t.weight},
@@ -116,10 +115,10 @@ Json fit_json(const FitAnswer& a, const FitRequest& request) {
   out["throws"] = throws_json(a);
   out["warnings"] = fit_warnings(a, request);
   out["notes"] = fit_notes(a, request);
-  for (const auto& [split, name] : {std::pair{Split::train, "train"}, {Split::test, "test"}}) {
+  for (const Split split : {Split::train, Split::test}) {
     const auto n = static_cast<int>(std::count_if(a.errors.throws.begin(), a.errors.throws.end(),
-                                                  [s = split](const auto& one) { return one.split == s; }));
-    out[name] = errors_json(n, [&, s = split](int q) { return a.errors.statistics(q, s); });
+                                                  [&](const auto& one) { return one.split == split; }));
+    out[to_string(split)] = errors_json(n, [&](int q) { return a.errors.statistics(q, split); });
   }
   out["cross_validation"] = nullptr;
   if (const auto& cv = a.cross_validation) {
@@ -142,11 +141,11 @@ Json fit_json(const FitAnswer& a, const FitRequest& request) {
   out["floor"] = nullptr;
   if (a.floor) {
     Json& floor = out["floor"] = {{"twins", a.floor->twins}};
-    for (const auto& [split, name] : {std::pair{Split::train, "train"}, {Split::test, "test"}}) {
-      const auto of = [&, s = split](int q) { return a.floor->statistics(q, s); };
+    for (const Split split : {Split::train, Split::test}) {
+      const auto of = [&](int q) { return a.floor->statistics(q, split); };
       int n = 0;  // throws, of which some quantity may not be measured
       for (int q = 0; q < experiment::kQuantityCount; ++q) n = std::max(n, of(q).n);
-      floor[name] = errors_json(n, of);
+      floor[to_string(split)] = errors_json(n, of);
     }
   }
   return out;

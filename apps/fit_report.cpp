@@ -79,14 +79,13 @@ Table error_table(const FitAnswer& a) {
     }
     out.rows.push_back(std::move(row));
   };
-  for (const auto& [split, name] : {std::pair{Split::train, "train"}, {Split::test, "test"}}) {
-    const auto n =
-        static_cast<std::size_t>(std::count_if(a.errors.throws.begin(), a.errors.throws.end(),
-                                               [s = split](const auto& one) { return one.split == s; }));
+  for (const Split split : {Split::train, Split::test}) {
+    const auto n = static_cast<std::size_t>(std::count_if(
+        a.errors.throws.begin(), a.errors.throws.end(), [&](const auto& one) { return one.split == split; }));
     if (n == 0) continue;
-    add(name, n, [&, s = split](int q) { return a.errors.statistics(q, s); });
+    add(to_string(split), n, [&](int q) { return a.errors.statistics(q, split); });
     if (!a.floor || a.floor->twins == 0) continue;
-    const auto floor = [&, s = split](int q) { return a.floor->statistics(q, s); };
+    const auto floor = [&](int q) { return a.floor->statistics(q, split); };
     add("  its floor", n, floor);
     std::vector<std::string> ratio{"  over it", ""};
     for (int q = 0; q < experiment::kQuantityCount; ++q) {
@@ -221,7 +220,7 @@ Table fit_throw_table(const FitAnswer& a) {
     std::vector<std::string> row{c.id,
                                  c.object,
                                  c.condition,
-                                 c.split == Split::train ? "train" : "test",
+                                 to_string(c.split),
                                  t.used ? "yes" : "no",
                                  all_digits(t.used, t.weight),
                                  all_digits(t.used, t.chi2)};

@@ -9,15 +9,9 @@
 namespace unhand::apps {
 namespace {
 
-using experiment::Channel;
-
 constexpr double kWildMisfit = 900;  ///< χ² per sample of a channel that is told of: 30 σ
 constexpr double kPoorFit = 2;   ///< χ² per degree of freedom from which parameters are not to be trusted
 constexpr double kHardly = 0.7;  ///< weight of a channel that the fit does not believe
-
-bool is_wrench(Channel channel) {
-  return channel == Channel::wrench_fx || channel == Channel::wrench_fz || channel == Channel::wrench_tau;
-}
 
 /// Whether each channel but for the throw that errs most in it leaves a good fit.
 bool is_of_single_throws(const fitting::FitResult& fit) {

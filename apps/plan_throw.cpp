@@ -6,7 +6,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <memory>
 #include <numbers>
@@ -183,7 +182,6 @@ PredictedLandings by_release(const std::string& name, const planners::JointTraje
 std::vector<ThrowAnswer::Number> numbers_of(const planners::ReleaseCard& card,
                                             const planners::HeldObject& object,
                                             const std::optional<datasets::Sku>& sku) {
-  using planners::NumberSource;
   std::vector<ThrowAnswer::Number> out;
   const auto say = [](const std::string& value, const std::string& sigma, bool uncertain) {
     return !uncertain || value == sigma ? value : fmt::format("{}; sigma: {}", value, sigma);

@@ -67,7 +67,7 @@ Json prediction_json(const experiment::ThrowComparison& one, const experiment::P
   Json out{{"id", one.id},
            {"object", one.object},
            {"condition", one.condition},
-           {"split", one.split == datasets::Split::train ? "train" : "test"},
+           {"split", to_string(one.split)},
            {"outcome", outcome_of(p)},
            {"slips_at_start", p.slips_at_start},
            {"detach", nullptr},

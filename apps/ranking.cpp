@@ -61,9 +61,8 @@ Figure ranking_figure(std::span<const fitting::Ranked> ranking,
   for (const auto& r : by_step) {
     if (!(r.gain > 1)) continue;
     if (r.step != step) line(fmt::format("{{/:Bold step {}}}", step = r.step));
-    const bool taken =
-        std::any_of(accepted.begin(), accepted.end(), [&](const auto& e) { return e.id == r.id; });
-    block.rows.push_back({r.gain, line(plain(r.id)), taken ? 1.0 : 0.0, static_cast<double>(r.step)});
+    block.rows.push_back({r.gain, line(plain(r.id)), fitting::is_accepted(r.id, accepted) ? 1.0 : 0.0,
+                          static_cast<double>(r.step)});
     largest = std::max(largest, r.gain);
   }
   if (block.rows.empty()) line("none");

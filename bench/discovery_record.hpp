@@ -1,7 +1,6 @@
 // What a study of the loop keeps of one campaign, one line of JSON, and the tables over many.
 #pragma once
 
-#include <map>
 #include <string>
 #include <vector>
 

@@ -16,7 +16,6 @@
 #include <array>
 #include <cmath>
 #include <ctime>
-#include <memory>
 #include <string>
 #include <vector>
 

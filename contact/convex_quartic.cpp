@@ -3,7 +3,6 @@
 #include <fmt/core.h>
 
 #include <Eigen/Core>
-#include <limits>
 #include <numbers>
 #include <stdexcept>
 #include <type_traits>

@@ -2,11 +2,8 @@
 // noise known.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
 #include <span>
-#include <type_traits>
 #include <vector>
 
 #include "dynamics/piecewise_polynomial.hpp"

@@ -8,7 +8,6 @@
 namespace unhand::contact {
 
 using dynamics::value_of;
-using std::sqrt;
 
 namespace {
 

@@ -1,8 +1,6 @@
 // A release in the Bullet physics engine, in double precision: another code, another method.
 #pragma once
 
-#include <string>
-
 #include "contact/patch.hpp"
 #include "release/simulate_release.hpp"
 

@@ -1,7 +1,6 @@
 // How what importers read from several files becomes the throws of one log.
 #pragma once
 
-#include <cmath>
 #include <cstddef>
 #include <filesystem>
 #include <optional>

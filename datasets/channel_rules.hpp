@@ -1,7 +1,6 @@
 // The rules every table of samples obeys, wherever it came from. Private to the module.
 #pragma once
 
-#include <algorithm>
 #include <span>
 #include <string>
 

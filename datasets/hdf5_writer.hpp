@@ -55,9 +55,7 @@ struct AttributeWriter {
     out.reals(name, &value, 1, true);
   }
   void operator()(std::string_view name, int value, const Range&) const { out.integer(name, value); }
-  void operator()(std::string_view name, Split split) const {
-    out.text(name, split == Split::train ? "train" : "test");
-  }
+  void operator()(std::string_view name, Split split) const { out.text(name, to_string(split)); }
   void operator()(std::string_view name, const std::array<double, 3>& values, const Range&) const {
     out.reals(name, values.data(), 3, false);
   }

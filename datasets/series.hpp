@@ -21,6 +21,8 @@ struct Series {
   /// Row i < rows, column j < cols; others are not checked.
   double operator()(std::size_t i, std::size_t j = 0) const { return data[i * cols + j]; }
   double& operator()(std::size_t i, std::size_t j = 0) { return data[i * cols + j]; }
+  /// The declared 1 σ of column j; 0 where none was declared.
+  double sigma_of(std::size_t j = 0) const { return j < sigma.size() ? sigma[j] : 0; }
   /// Equal where all numbers are; a NaN, as lost samples may be, is equal to a NaN.
   bool operator==(const Series& other) const {
     const auto same = [](const std::vector<double>& a, const std::vector<double>& b) {

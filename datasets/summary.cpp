@@ -164,8 +164,8 @@ void add_scatter(NoiseSummary& noise, const Channel<Throw>& channel, std::vector
     whitened.resize(all.size());
     for (std::size_t j = 0; j < values.cols; ++j) {
       all[j].add(time_of(toss, channel.group), values, j, rows, 1);
-      const double sigma = values.sigma.empty() ? 0 : values.sigma[values.sigma.size() == 1 ? 0 : j];
-      if (sigma > 0) whitened[j].add(time_of(toss, channel.group), values, j, rows, sigma);
+      if (const double sigma = values.sigma_of(j); sigma > 0)
+        whitened[j].add(time_of(toss, channel.group), values, j, rows, sigma);
     }
   }
   constexpr double kSure = 3;
@@ -297,7 +297,7 @@ std::string to_json(const LogSummary& summary) {
     each.push_back({{"id", toss.id},
                     {"object", toss.object},
                     {"condition", toss.condition},
-                    {"split", toss.split == Split::train ? "train" : "test"},
+                    {"split", to_string(toss.split)},
                     {"landing", toss.landing},
                     {"channels", channels}});
   }

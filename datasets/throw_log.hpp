@@ -81,6 +81,8 @@ enum class Split {
   train,  ///< may be fitted to
   test,   ///< held out: only judges
 };
+/// The split's name, as it is written above.
+inline const char* to_string(Split split) { return split == Split::train ? "train" : "test"; }
 
 /// One throw of a log: what was measured, by sensor.
 struct Throw {

@@ -1,8 +1,6 @@
 // The event-detected integrator of hybrid systems.
 #pragma once
 
-#include <array>
-#include <string>
 #include <vector>
 
 #include "dynamics/hybrid_system.hpp"

@@ -1,7 +1,6 @@
 // One step of the linear equations that derivatives with respect to parameters obey along a known solution.
 #pragma once
 
-#include <algorithm>
 #include <array>
 
 #include "dynamics/hybrid_system.hpp"

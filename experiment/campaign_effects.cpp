@@ -125,8 +125,8 @@ std::pair<std::string, double> parse_effect(std::string_view text) {
   double value = 0;
   const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), value);
   if (error != std::errc() || end != number.data() + number.size()) {
-    checked(name,
-            find(split_object(name).first).parameter ? find(split_object(name).first).parameter->neutral : 0);
+    const EffectParameter* parameter = find_parameter(split_object(name).first);
+    checked(name, parameter ? parameter->neutral : 0);
     throw std::invalid_argument(fmt::format("effect {}: \"{}\" is not a number", name, number));
   }
   return {checked(name, value), value};

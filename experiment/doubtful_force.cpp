@@ -58,7 +58,6 @@ S DoubtfulForce::from_base(double t) const {
 
 template <class S>
 S DoubtfulForce::at_(const Window& window, const S& t) const {
-  using std::pow;
   const S there = to_base(t);
   const Window seen{to_base(window.begin), to_base(window.end)};
   const S force = base_.at(seen, there);

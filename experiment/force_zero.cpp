@@ -23,8 +23,8 @@ std::optional<contact::NormalForceSummary> opening_of_force(const datasets::Thro
   contact::NormalForceOptions options;
   options.max_tail_bias = 1e3;  // the object flew, so what is left is the sensor's, whatever it is
   try {
-    const auto smooth = contact::smooth_normal_force(
-        one.ft->time.data, series.data, series.sigma.empty() ? 0.0 : series.sigma.front(), options);
+    const auto smooth =
+        contact::smooth_normal_force(one.ft->time.data, series.data, series.sigma_of(), options);
     if (std::isfinite(smooth.summary.release_time) && std::isfinite(smooth.summary.tail_mean_sigma))
       return smooth.summary;
   } catch (const std::invalid_argument&) {  // too short a series: those who use the throw say so

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <stdexcept>
 
 #include "contact/contact_model.hpp"
 #include "contact/convex_quartic.hpp"

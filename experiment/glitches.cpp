@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <optional>
 #include <utility>
 
 #include "dynamics/quantisation.hpp"
@@ -205,7 +204,7 @@ std::size_t mark_glitches(datasets::MocapLog& mocap) {
     for (std::size_t c = 0; c < columns.size(); ++c) columns[c].push_back(mocap.pose(i, c));
   }
   for (std::size_t c = 0; c < columns.size(); ++c)
-    sigma.push_back(std::max(c < mocap.pose.sigma.size() ? mocap.pose.sigma[c] : 0, scatter_of(columns[c])));
+    sigma.push_back(std::max(mocap.pose.sigma_of(c), scatter_of(columns[c])));
   const auto off = glitches(times, columns, sigma);
   const auto count = static_cast<std::size_t>(std::count(off.begin(), off.end(), true));
   if (count == 0) return 0;

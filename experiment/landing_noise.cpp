@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <map>
 #include <numbers>
 #include <vector>
@@ -163,8 +162,7 @@ bool tells_angle(const datasets::LandingLog& landing) {
 }
 
 bool declares_noise(const datasets::LandingLog& landing, std::size_t column) {
-  const auto& sigma = landing.pose.sigma;
-  return !sigma.empty() && sigma[sigma.size() == 1 ? 0 : column] > 0;
+  return landing.pose.sigma_of(column) > 0;
 }
 
 int landings_without_sigma(const datasets::ThrowLog& log) {

@@ -53,9 +53,9 @@ double rounding_of(const Series& series, std::size_t column) {
 /// The declared σ is the sensor's before its readings are rounded; their scatter has the rounding in it.
 double sigma_of(const Series& series, std::size_t column, double least) {
   const double rounding = rounding_of(series, column);
-  double sigma = 0;
-  if (!series.sigma.empty()) sigma = series.sigma[series.sigma.size() == 1 ? 0 : column];
-  sigma = sigma > 0 ? std::hypot(sigma, rounding) : std::max(scatter_of(series, column), rounding);
+  const double declared = series.sigma_of(column);
+  const double sigma =
+      declared > 0 ? std::hypot(declared, rounding) : std::max(scatter_of(series, column), rounding);
   return std::max(sigma, least);
 }
 

@@ -1,9 +1,7 @@
 // What the sensors saw of a throw, as one list of numbers with their noise.
 #pragma once
 
-#include <array>
 #include <optional>
-#include <string>
 #include <string_view>
 #include <vector>
 
@@ -31,6 +29,15 @@ enum class Channel {
 inline constexpr int kChannelCount = 10;
 /// The channel's name as reports have it: "mocap.theta".
 std::string_view to_string(Channel);
+
+/// Whether a channel is of a pad's wrench.
+inline bool is_wrench(Channel c) {
+  return c == Channel::wrench_fx || c == Channel::wrench_fz || c == Channel::wrench_tau;
+}
+/// Whether it is of motion capture.
+inline bool is_tracked(Channel c) {
+  return c == Channel::mocap_x || c == Channel::mocap_z || c == Channel::mocap_theta;
+}
 
 /// One measured number with its noise.
 struct Observation {

@@ -20,9 +20,7 @@ using dynamics::Window;
 namespace {
 
 std::array<double, 3> sigma_of(const Series& series) {
-  if (series.sigma.size() == 3) return {series.sigma[0], series.sigma[1], series.sigma[2]};
-  if (series.sigma.size() == 1) return {series.sigma[0], series.sigma[0], series.sigma[0]};
-  return {0, 0, 0};
+  return {series.sigma_of(0), series.sigma_of(1), series.sigma_of(2)};
 }
 
 /// The state at `detach` of the free flight that explains the motion capture from `from` on. Drag enters as a
@@ -123,8 +121,8 @@ void smooth_force(const LoggedThrow& source, PreparedThrow& out) {
   contact::NormalForceOptions options;
   if (lets_go(source, out.hand)) options.max_tail_bias = 0.5;  // what is left then is the sensor's
   try {
-    auto force = contact::smooth_normal_force(source.logged.ft->time.data, series.data,
-                                              series.sigma.empty() ? 0.0 : series.sigma.front(), options);
+    auto force =
+        contact::smooth_normal_force(source.logged.ft->time.data, series.data, series.sigma_of(), options);
     out.normal_force = std::move(force.force);
     out.force_fit = force.summary;
   } catch (const std::invalid_argument& error) {
@@ -223,7 +221,7 @@ double flight_end(const datasets::ThrowLog& log, const datasets::Throw& logged, 
   double end = HUGE_VAL;
   if (logged.landing && !logged.landing->time.empty()) {
     const auto& time = logged.landing->time;
-    const double blur = time.sigma.empty() ? 0 : 3 * time.sigma[0];
+    const double blur = 3 * time.sigma_of();
     const bool goes_on = mocap.time(mocap.time.rows - 1) > time(0) + std::max(blur, kRounding);
     end = time(0) + (goes_on ? -blur : kRounding);
   }

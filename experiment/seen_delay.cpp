@@ -1,6 +1,5 @@
 #include "experiment/seen_delay.hpp"
 
-#include <cmath>
 #include <vector>
 
 #include "contact/contact_model.hpp"

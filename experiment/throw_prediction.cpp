@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <stdexcept>
 
 #include "contact/patch.hpp"
 #include "contact/registry.hpp"
-#include "experiment/outcome_slopes.hpp"
 
 namespace unhand::experiment {
 

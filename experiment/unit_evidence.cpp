@@ -261,8 +261,7 @@ void check_friction(const datasets::ThrowLog& log, const datasets::FtLog& ft, do
       contact::kUniformDisc * (log.gripper ? log.gripper->pad_radius.value_or(HUGE_VAL) : HUGE_VAL);
   const auto& force = ft.normal_force;
   if (force.empty()) return;
-  const double most = *std::max_element(force.data.begin(), force.data.end()),
-               sigma = force.sigma.empty() ? 0 : force.sigma.front(),
+  const double most = *std::max_element(force.data.begin(), force.data.end()), sigma = force.sigma_of(),
                low = std::max(0.0, at_the_end(force)) + std::max(0.02 * most, 4 * sigma);
   std::vector<std::pair<double, double>> slips;  // normal force, and friction
   for (std::size_t i = 0; i < ft.time.rows; ++i)

@@ -96,7 +96,7 @@ bool is_confirmed(const ColumnSide& column, const SizeRatios& sizes) {
 }
 
 /// What other throws say that should be `apart` times as large at most, where no other channel of the throw
-/// tells its size; `sizes` of a throw of the log.
+/// tells its size; `sizes_of` a throw of the log.
 template <class Sizes>
 void check_repetitions(const std::vector<const Throw*>& alike, const PlainColumn& column, double apart,
                        const Sizes& sizes_of, Doubts& out) {

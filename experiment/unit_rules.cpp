@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <numbers>
-#include <optional>
 
 namespace unhand::experiment {
 

@@ -5,7 +5,6 @@
 
 #include "contact/registry.hpp"
 #include "experiment/campaign_effects.hpp"
-#include "fitting/distributions.hpp"
 
 namespace unhand::fitting {
 
@@ -79,11 +78,6 @@ std::vector<Correlation> strong_correlations(const FitResult& fit, double limit)
   std::sort(out.begin(), out.end(),
             [](const Correlation& a, const Correlation& b) { return std::abs(a.value) > std::abs(b.value); });
   return out;
-}
-
-std::array<double, 2> FittedUnknown::interval95() const {
-  if (profile) return *profile;
-  return student_interval(value, sigma, interval_freedom());
 }
 
 }  // namespace unhand::fitting

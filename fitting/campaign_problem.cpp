@@ -11,7 +11,6 @@
 #include "contact/registry.hpp"
 #include "datasets/near_miss.hpp"
 #include "dynamics/median.hpp"
-#include "dynamics/parallel.hpp"
 #include "experiment/compare.hpp"
 #include "experiment/force_zero.hpp"
 #include "experiment/glitches.hpp"

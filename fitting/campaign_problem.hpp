@@ -104,7 +104,8 @@ class CampaignProblem {
   const std::vector<Unknown>& own() const { return own_; }
   /// What predictions are made with.
   const experiment::ThrowModel& model() const { return model_; }
-  /// As they were given.
+  /// As they were given, with the model and the effects of with() and the noise of landings that declare
+  /// none.
   const CampaignOptions& options() const { return options_; }
   /// What was left out of the log, and why.
   const std::vector<std::string>& notes() const { return notes_; }

@@ -38,14 +38,6 @@ constexpr BaseParameter kBase[] = {{"mu", "-", 0, contact::kMostMu, true},
                                    {"shape", "-", 1e-3, 100, true},
                                    {"delay", "s", 0, 10, false}};
 
-void check(const std::string& file, const std::string& name, const datasets::CardParameter& p,
-           const std::string& unit, double low, double high) {
-  const std::string path = "/parameters/" + name;
-  if (p.unit != unit) throw CardError(file, path + "/unit", fmt::format("is '{}', not '{}'", p.unit, unit));
-  if (!(p.value >= low && p.value <= high))
-    throw CardError(file, path + "/value", fmt::format("{} is not in [{}, {}] {}", p.value, low, high, unit));
-}
-
 /// How far beyond a range a condition may lie for other reasons than a share of its ends.
 struct ConditionScatter {
   const char *condition, *spread;  ///< the card's own spread that acts like it; null: none
@@ -96,7 +88,7 @@ std::string in_words(const Condition& is, const CardRange& range) {
 }
 
 void widen(std::map<std::string, CardRange>& range, const experiment::PreparedThrow& prepared, Share share) {
-  if (share != Share::all && (prepared.split == datasets::Split::train) != (share == Share::train)) return;
+  if (!takes(share, prepared.split)) return;
   for (const auto& [name, unit, value] : conditions_of(prepared)) {
     auto& r = range.try_emplace(name, CardRange{value, value, unit}).first->second;
     r.low = std::min(r.low, value);
@@ -240,6 +232,14 @@ bool is_fitted(const ModelCard& card) {
   return !card.effects.empty() || !card.own_spreads.empty() || card.covariance.has_value();
 }
 
+void require_parameter(const std::string& file, const std::string& name, const datasets::CardParameter& p,
+                       const std::string& unit, double low, double high) {
+  const std::string path = "/parameters/" + name;
+  if (p.unit != unit) throw CardError(file, path + "/unit", fmt::format("is '{}', not '{}'", p.unit, unit));
+  if (!(p.value >= low && p.value <= high))
+    throw CardError(file, path + "/value", fmt::format("{} is not in [{}, {}] {}", p.value, low, high, unit));
+}
+
 CampaignOptions options_of(const ModelCard& card, const std::string& file) {
   const auto models = contact::contact_model_names();
   if (std::find(models.begin(), models.end(), card.model) == models.end())
@@ -264,16 +264,16 @@ CampaignOptions options_of(const ModelCard& card, const std::string& file) {
         std::begin(kBase), std::end(kBase),
         [&, &key = name](const BaseParameter& b) { return b.of_pads == follows_pads && key == b.name; });
     bool known = base != std::end(kBase);
-    if (known) check(file, name, parameter, base->unit, base->low, base->high);
+    if (known) require_parameter(file, name, parameter, base->unit, base->low, base->high);
     for (const auto& p : contact::law_parameters(card.model))
       if (name == p.name) {
-        check(file, name, parameter, p.unit, p.low, p.high);
+        require_parameter(file, name, parameter, p.unit, p.low, p.high);
         known = true;
       }
     for (const auto& effect : effects)
       for (const auto& p : effect.parameters)
         if (experiment::without_object(name) == effect.full_name(p)) {
-          check(file, name, parameter, p.unit, p.low, p.high);
+          require_parameter(file, name, parameter, p.unit, p.low, p.high);
           known = true;
         }
     if (!known)

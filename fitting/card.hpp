@@ -34,9 +34,9 @@ std::map<std::string, datasets::CardRange> valid_range_of(const CampaignProblem&
 
 /// By this share of its ends a throw may lie beyond a valid range: sensors are no better, and a model that
 /// holds inside does not end there. It may also do so by three sigma of what the card's own throws scattered
-/// by unseen (grip_force: mu_deviation, as its share; com_offset: grasp_offset; opening_time:
-/// dead_time_deviation), and by what no robot repeats: com_offset 1 mm, speeds 0.02 m/s, rates 0.05 rad/s.
-/// So a range without width is no equality.
+/// by unseen (grip_force: mu_deviation, as its share; com_offset: grasp_offset; opening_time and dead_time:
+/// dead_time_deviation), and by what no robot repeats: com_offset 1 mm, dead_time 1 ms, shape 0.1, speeds
+/// 0.02 m/s, rates 0.05 rad/s. So a range without width is no equality.
 inline constexpr double kRangeMargin = 0.01;
 /// A condition in which a card has not been tried.
 struct UntriedCondition {
@@ -80,6 +80,11 @@ datasets::ModelCard card_of(const CampaignProblem& problem, const FitResult& fit
 /// Whether the card comes from a fit (it holds effects, spreads or a covariance), rather than from a plain
 /// estimate.
 bool is_fitted(const datasets::ModelCard& card);
+
+/// Throws datasets::CardError, naming `file`, for a parameter of a card in another unit or out of range.
+void require_parameter(const std::string& file, const std::string& name,
+                       const datasets::CardParameter& parameter, const std::string& unit, double low,
+                       double high);
 
 /// The problem's options that a fitted card asks for, to predict with it. Throws datasets::CardError, naming
 /// `file`, for a model, an effect or a parameter that this library lacks, a wrong unit or a value out of

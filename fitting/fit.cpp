@@ -19,7 +19,6 @@
 namespace unhand::fitting {
 
 using dynamics::Spectrum, dynamics::spectrum_of;
-using experiment::Channel;
 
 namespace {
 
@@ -227,14 +226,12 @@ FitResult fit_from(std::vector<double> start, const CampaignProblem& problem, co
   }
   if (rounds.used().empty()) {
     out.outcome = FitOutcome::no_start;
-    const bool train = options.share == Share::train;
     const bool any =
-        std::any_of(problem.throws().begin(), problem.throws().end(), [&](const CampaignThrow& one) {
-          return options.share == Share::all || train == (one.prepared.split == datasets::Split::train);
-        });
+        std::any_of(problem.throws().begin(), problem.throws().end(),
+                    [&](const CampaignThrow& one) { return takes(options.share, one.prepared.split); });
     out.message =
         !any ? fmt::format("none of the log's {} throws has the split '{}', and no others are fitted to",
-                           problem.throws().size(), train ? "train" : "test")
+                           problem.throws().size(), options.share == Share::train ? "train" : "test")
         : rounds.refused()
             ? fmt::format("throw {} could not be simulated with the parameters that the fit starts from: {}",
                           out.throws[*rounds.refused()].id, out.why_not())

@@ -2,9 +2,7 @@
 #pragma once
 
 #include <array>
-#include <map>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -34,6 +32,10 @@ enum class Share {
   test,   ///< those of the test split
   all,    ///< both
 };
+/// Whether the throws of a split do.
+inline bool takes(Share share, datasets::Split split) {
+  return share == Share::all || (share == Share::train) == (split == datasets::Split::train);
+}
 
 /// What a channel that the model cannot follow counts for.
 enum class Weigh {
@@ -100,7 +102,9 @@ struct FittedUnknown {
   std::optional<std::array<double, 2>> profile{};
   bool allows_for_few{};  ///< ±1.96 sigma is the 95 % interval: wider by Student's t, or of declared noise
   /// The 95 % interval: the profile's, or value ± t sigma, Student's t (1.96 where sigma allows for few).
-  std::array<double, 2> interval95() const;
+  std::array<double, 2> interval95() const {
+    return profile ? *profile : student_interval(value, sigma, interval_freedom());
+  }
   /// Degrees of freedom of that t.
   double interval_freedom() const { return allows_for_few ? kCertain : degrees_of_freedom; }
 };

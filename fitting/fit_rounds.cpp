@@ -31,10 +31,9 @@ void FitRounds::choose_throws(const std::vector<double>& start) {
   std::vector<Linearisation> starts(throws.size());
   const std::vector<double> own(problem_.own().size(), 0.0);
   dynamics::parallel_for(throws.size(), options_.threads, [&](std::size_t i) {
-    const bool shared =
-        options_.share == Share::all ||
-        (options_.share == Share::train) == (throws[i].prepared.split == datasets::Split::train);
-    if (!shared || throws[i].observed.all.empty() || !(options_.throws.empty() || options_.throws[i])) return;
+    if (!takes(options_.share, throws[i].prepared.split) || throws[i].observed.all.empty() ||
+        !(options_.throws.empty() || options_.throws[i]))
+      return;
     starts[i] = problem_.linearise(throws[i], start, own, DerivativesBy::nothing);
   });
   for (const Linearisation& one : starts) why_not_.push_back(one.why_not);

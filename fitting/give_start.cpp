@@ -1,8 +1,6 @@
 #include "fitting/give_start.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <string>
 
 namespace unhand::fitting {
 

@@ -1,7 +1,6 @@
 #include "fitting/gradient_cost.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <ctime>
 #include <vector>
 

@@ -76,8 +76,8 @@ void profile(FitRounds& rounds, FitResult& fit) {
   const auto width = static_cast<Eigen::Index>(fit.campaign.size());
   for (std::size_t k = 0; k < fit.campaign.size(); ++k) {
     FittedUnknown& u = fit.campaign[k];
-    const double t = student_factor(u.degrees_of_freedom);
-    if (rounds.is_fixed(u.unknown) || !is_weak(u, t * u.sigma) || !(u.sigma > 0)) continue;
+    const double t = student_factor(u.degrees_of_freedom), half = t * u.sigma;
+    if (rounds.is_fixed(u.unknown) || !is_weak(u, half) || !(u.sigma > 0)) continue;
     if (!(u.data_sigma <
           u.unknown.high - u.unknown.low)) {  // the log has no say: a profile would be the prior's
       u.profile = {-HUGE_VAL, HUGE_VAL};
@@ -88,9 +88,8 @@ void profile(FitRounds& rounds, FitResult& fit) {
     for (Eigen::Index j = 0; j < width; ++j)
       if (const auto& prior = fit.campaign[static_cast<std::size_t>(j)].unknown.prior_sigma)
         H(j, j) += 1 / (*prior * *prior);
-    std::vector<double> scale = rounds.shared().scale;
     const auto i = static_cast<Eigen::Index>(k);
-    const Eigen::VectorXd column = guarded_inverse(H, scale).col(i);
+    const Eigen::VectorXd column = guarded_inverse(H, rounds.shared().scale).col(i);
     const double claimed = column[i];
     if (!column.allFinite() || !(claimed > 0)) {
       u.profile = {-HUGE_VAL, HUGE_VAL};
@@ -100,7 +99,6 @@ void profile(FitRounds& rounds, FitResult& fit) {
     const Eigen::VectorXd along = column / claimed;
     const std::array<double, 2> found{end_of(rounds, fit, k, along, t, unit, -1),
                                       end_of(rounds, fit, k, along, t, unit, 1)};
-    const double half = t * u.sigma;
     if (std::abs(u.value - half - found[0]) > 0.1 * half || std::abs(u.value + half - found[1]) > 0.1 * half)
       u.profile = found;
   }

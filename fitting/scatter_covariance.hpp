@@ -38,9 +38,9 @@ ScatterCovariance scatter_covariance(const std::vector<Cluster>& clusters, const
                                      const Eigen::MatrixXd& prior);
 
 /// The same for clusters of which some unknowns are known from few, as the size of one object from its two
-/// flights: the variance over noise of an unknown with less than
-/// kFewDegrees is mixed with that of those which have more, as four degrees of freedom that it borrows. What
-/// a prior holds for the most part takes no part in that. No unknown is surer than the noise lets it be.
+/// flights: the variance over noise of an unknown with less than kFewDegrees is mixed with that of those
+/// which have more, as kBorrowed degrees of freedom. What a prior holds for the most part takes no part in
+/// that. No unknown is surer than the noise lets it be.
 inline constexpr double kFewDegrees = 5, kBorrowed = 4;
 ScatterCovariance borrowing_scatter(const std::vector<Cluster>& clusters, const Eigen::MatrixXd& information,
                                     const Eigen::MatrixXd& prior);

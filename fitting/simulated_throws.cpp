@@ -1,6 +1,5 @@
 #include "fitting/simulated_throws.hpp"
 
-#include <stdexcept>
 #include <utility>
 
 #include "dynamics/parallel.hpp"

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <random>
 #include <stdexcept>
-#include <utility>
 
 #include "dynamics/require_finite.hpp"
 #include "flight/fly.hpp"

@@ -19,7 +19,6 @@ using dynamics::Entry;
 using dynamics::Phase;
 using dynamics::Pose;
 using dynamics::State;
-using dynamics::Twist;
 using dynamics::value_of;
 using dynamics::Vec2;
 

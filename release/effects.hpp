@@ -1,7 +1,6 @@
 // What a release may do otherwise than its log says.
 #pragma once
 
-#include <cmath>
 #include <vector>
 
 #include "contact/normal_force.hpp"

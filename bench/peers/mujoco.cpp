@@ -3,7 +3,6 @@
 #include <mujoco/mujoco.h>
 #include <unistd.h>
 
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <numbers>

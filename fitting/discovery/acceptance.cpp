@@ -13,8 +13,6 @@
 
 namespace unhand::fitting {
 
-using experiment::Channel;
-
 namespace {
 
 /// Most of a wrench's variance is trust, not noise: one that is explained falls below 1.

@@ -25,4 +25,8 @@ void AcceptedEffect::add_other_name(const std::string& other, double correlation
   equivalent.push_back({other, correlation});
 }
 
+bool is_accepted(const std::string& id, std::span<const AcceptedEffect> effects) {
+  return std::any_of(effects.begin(), effects.end(), [&](const AcceptedEffect& e) { return e.id == id; });
+}
+
 }  // namespace unhand::fitting

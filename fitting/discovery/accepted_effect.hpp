@@ -3,6 +3,7 @@
 
 #include <array>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -48,6 +49,9 @@ struct AcceptedEffect {
   /// Another name that the data cannot tell from this one; of several correlations the largest counts.
   void add_other_name(const std::string& other, double correlation);
 };
+
+/// Whether an effect is one of them.
+bool is_accepted(const std::string& id, std::span<const AcceptedEffect> effects);
 
 /// Terms that describe tracked flights, and where they do so better than accepted effects of the air.
 struct AskedForm {

@@ -11,7 +11,6 @@
 #include "fitting/discovery/misfit_rules.hpp"
 #include "fitting/discovery/traces.hpp"
 #include "fitting/discovery/where_acts.hpp"
-#include "fitting/discovery/withdrawal.hpp"
 
 namespace unhand::fitting {
 

@@ -27,9 +27,7 @@ enum Block { kWrench, kHeld, kFlight, kLanding, kBlocks };
 Block block_of(Channel channel, Phase phase) {
   if (phase == Phase::landing) return kLanding;
   if (phase == Phase::flight) return kFlight;
-  return channel == Channel::mocap_x || channel == Channel::mocap_z || channel == Channel::mocap_theta
-             ? kHeld
-             : kWrench;
+  return is_tracked(channel) ? kHeld : kWrench;
 }
 
 /// One throw: all of its samples, and without each block; its own unknowns eliminated.

@@ -63,7 +63,7 @@ class Displacement {
   std::vector<Vector3> at_;
 };
 
-/// Mean square errors of one throw's prediction: in flight [m²] and of the landing [σ²].
+/// Sums of the squared errors of predictions, and over how much: in flight [m²], of the landing [σ²].
 struct OutcomeSquares {
   double flight{}, samples{}, landing{}, landings{};
 };

@@ -64,6 +64,7 @@ void FootprintColumns::add_effects(const std::vector<std::string>& ids) {
 }
 
 void FootprintColumns::add_law(const std::string& law) {
+  if (law == problem_.options().model) return;
   CampaignProblem other = problem_.with(law, problem_.options().effects);
   auto at = carried(fit_, other);
   candidates_.push_back({std::string(kLaw) + law, {""}, {width_}, {}, {1}});

@@ -12,11 +12,6 @@
 
 namespace unhand::fitting {
 
-class FootprintColumns;
-/// Of the candidates that it has, over the throws of the fit.
-Footprints footprints(const FootprintColumns& columns, const CampaignProblem& problem, const FitResult& fit,
-                      int threads);
-
 /// Columns of whitened observations, each per unit of its parameter: first the derivatives by the model's
 /// unknowns, then those of the candidates, last the residual. Where an effect has no derivative on both sides
 /// of neutral, and for a law, the column is a difference of two simulations.
@@ -34,7 +29,7 @@ class FootprintColumns {
   /// One candidate for every effect that the problem does not have: at each value of its shape parameters'
   /// grid, and a one-sided one at three sizes. To be called once.
   void add_effects(const std::vector<std::string>& ids);
-  /// One candidate for a law that is not the problem's.
+  /// One candidate for a law, if it is not the problem's.
   void add_law(const std::string& law);
 
   const std::vector<Candidate>& candidates() const { return candidates_; }
@@ -92,5 +87,9 @@ class FootprintColumns {
   std::vector<Derivatives> derivatives_;  // the first: of the model and of all effects without shapes
   std::vector<Difference> differences_;
 };
+
+/// Of the candidates that it has, over the throws of the fit.
+Footprints footprints(const FootprintColumns& columns, const CampaignProblem& problem, const FitResult& fit,
+                      int threads);
 
 }  // namespace unhand::fitting

@@ -44,8 +44,7 @@ Footprints footprints(const CampaignProblem& problem, const FitResult& fit,
                       int threads) {
   FootprintColumns columns(problem, fit);
   columns.add_effects(ids);
-  for (const auto& law : laws)
-    if (law != problem.options().model) columns.add_law(law);
+  for (const auto& law : laws) columns.add_law(law);
   return footprints(columns, problem, fit, threads);
 }
 

@@ -14,10 +14,6 @@ namespace unhand::fitting {
 
 using experiment::Channel;
 
-bool is_tracked(Channel c) {
-  return c == Channel::mocap_x || c == Channel::mocap_z || c == Channel::mocap_theta;
-}
-
 namespace {
 
 /// Whether tracked flights lack no acceleration, of whatever form, that chance would not show: what is off in

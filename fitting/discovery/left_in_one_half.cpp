@@ -12,8 +12,6 @@
 
 namespace unhand::fitting {
 
-using experiment::Channel;
-
 namespace {
 
 /// Of which throws a misfit is: the fewest that hold most of it, by name or by the condition they share.

@@ -44,7 +44,4 @@ std::optional<double> too_small_by(const Discovery& so_far, experiment::Channel 
 /// sensors they are.
 double tolerated_rest(const Stage& stage);
 
-/// Whether a channel is of motion capture.
-bool is_tracked(experiment::Channel channel);
-
 }  // namespace unhand::fitting

@@ -76,50 +76,37 @@ void follow_flight(const CampaignProblem& problem, const CampaignThrow& thrown,
   if (n[0] > 0 && n[1] > 0 && n[2] > 0) out.flight = {sum[0] / n[0], sum[1] / n[1], sum[2] / n[2]};
 }
 
-/// Where the errors of all throws are compared by condition.
-class ByCondition {
- public:
-  explicit ByCondition(const std::vector<PredictedOutcome>& throws) : throws_(throws) {}
-  /// `read` gives a throw's error, or nothing. Adds to `out` what at least one throw says.
-  template <class Read>
-  void operator()(Outcome outcome, const Read& read, std::vector<OutcomeLack>& out) const {
+/// The errors of every outcome that at least one throw has, compared by condition.
+std::vector<OutcomeLack> lacks(const std::vector<PredictedOutcome>& throws) {
+  using Error = std::optional<std::array<double, 2>>;
+  std::vector<OutcomeLack> out;
+  const auto add = [&](Outcome outcome, const auto& error_of) {
     std::vector<std::array<double, 2>> error;
     std::vector<int> condition;
     double variance = 0;
-    for (const PredictedOutcome& thrown : throws_)
-      if (const std::optional<std::array<double, 2>> e = read(thrown)) {
+    for (const PredictedOutcome& thrown : throws)
+      if (const Error e = error_of(thrown)) {
         error.push_back(*e), condition.push_back(thrown.condition);
         variance += thrown.variance[static_cast<std::size_t>(outcome)];
       }
     if (error.empty()) return;
     const auto n = static_cast<double>(error.size());
     out.push_back({outcome, lack_of_fit(error, condition), std::sqrt(variance / n)});
-  }
-
- private:
-  const std::vector<PredictedOutcome>& throws_;
-};
-
-std::vector<OutcomeLack> lacks(const std::vector<PredictedOutcome>& throws) {
-  using Error = std::optional<std::array<double, 2>>;
-  const ByCondition of(throws);
+  };
   const auto landing = [](int quantity, double unit) {
     return [=](const PredictedOutcome& t) {
       const auto& e = t.error[static_cast<std::size_t>(quantity)];
       return e ? Error{{*e * unit, 0}} : Error{};
     };
   };
-  const auto flight = [](const PredictedOutcome& t) {
+  add(Outcome::position, [](const PredictedOutcome& t) {
     return t.flight ? Error{{(*t.flight)[0], (*t.flight)[1]}} : Error{};
-  };
-  const auto turned = [](const PredictedOutcome& t) {
+  });
+  add(Outcome::orientation, [](const PredictedOutcome& t) {
     return t.flight ? Error{{(*t.flight)[2], 0}} : Error{};
-  };
-  std::vector<OutcomeLack> out;
-  of(Outcome::position, flight, out);
-  of(Outcome::orientation, turned, out);
-  of(Outcome::landing_x, landing(kLandingX, 1), out);
-  of(Outcome::landing_theta, landing(kLandingTheta, 1 / experiment::kDegrees), out);
+  });
+  add(Outcome::landing_x, landing(kLandingX, 1));
+  add(Outcome::landing_theta, landing(kLandingTheta, 1 / experiment::kDegrees));
   return out;
 }
 
@@ -129,9 +116,7 @@ std::vector<PredictedOutcome> predicted_outcomes(const CampaignProblem& problem,
                                                  Share share, int threads) {
   std::vector<std::size_t> which;
   for (std::size_t i = 0; i < problem.throws().size(); ++i)
-    if (share == Share::all ||
-        (share == Share::train) == (problem.throws()[i].prepared.split == datasets::Split::train))
-      which.push_back(i);
+    if (takes(share, problem.throws()[i].prepared.split)) which.push_back(i);
   const auto predicted = predict_some(problem, fit, which, {false, threads});
   const auto campaign = fit.values();
   std::map<std::string, int> conditions;

@@ -5,7 +5,6 @@
 #include "contact/registry.hpp"
 #include "fitting/discovery/acceptance.hpp"
 #include "fitting/discovery/misfit_rules.hpp"
-#include "fitting/discovery/wald.hpp"
 #include "fitting/discovery/where_acts.hpp"
 #include "fitting/give_start.hpp"
 

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <optional>
 
 #include "fitting/discovery/acceptance.hpp"
 #include "fitting/discovery/asked_form.hpp"
@@ -106,9 +104,7 @@ FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out)
   if (gone.empty()) return counted;
   const Stage& less = without(stage, gone, options);
   if (!less.solved()) return counted;
-  std::erase_if(out.effects, [&](const AcceptedEffect& effect) {
-    return std::find(gone.begin(), gone.end(), effect.id) != gone.end();
-  });
+  std::erase_if(out.effects, [&](const AcceptedEffect& effect) { return is_among(gone, effect); });
   for (std::size_t k = 0; k < gone.size(); ++k) {
     const Stage& alone = without(stage, {gone[k]}, options);
     name_imitation({gone[k], why[k], alone.solved() ? stage.bic() - alone.bic() : 0}, out);

@@ -13,12 +13,6 @@
 
 namespace unhand::fitting {
 
-using experiment::Channel;
-
-bool is_wrench(Channel c) {
-  return c == Channel::wrench_fx || c == Channel::wrench_fz || c == Channel::wrench_tau;
-}
-
 bool Stage::is_fitted() const { return fit.is_answer(); }
 
 bool Stage::solved() const { return is_fitted() && held_out.is_answer(); }
@@ -130,6 +124,9 @@ const Footprints& footprints_of(const Stage& stage, const DiscoverOptions& optio
   return *stage.asked;
 }
 
+namespace {
+
+/// The problem with an effect more, or with another contact law.
 CampaignProblem extended_problem(const CampaignProblem& problem, const std::string& id) {
   const auto& options = problem.options();
   if (is_law(id)) return problem.with(id.substr(kLaw.size()), options.effects);
@@ -137,8 +134,6 @@ CampaignProblem extended_problem(const CampaignProblem& problem, const std::stri
   effects.push_back(id);
   return problem.with(options.model, effects);
 }
-
-namespace {
 
 /// Whether the search of a candidate may have gone astray. Where no misfit is left: it gains far less than
 /// its footprint promised, which would have been evident. Where one is, in the first step: it gains nothing,

@@ -51,11 +51,6 @@ std::vector<bool> throws_of(const Stage& stage);
 /// The footprints of the whole catalogue and of the laws at the stage's fit. Computed once.
 const Footprints& footprints_of(const Stage& stage, const DiscoverOptions& options);
 
-/// The problem with an effect more, or with another contact law.
-CampaignProblem extended_problem(const CampaignProblem& problem, const std::string& id);
-
-bool is_wrench(experiment::Channel);
-
 /// Fits the train throws from `start`; whether there is an answer. A shape
 /// parameter that the log leaves open over its whole range (a speed at which friction changes, while the
 /// friction hardly does; the landing's share of a tracker's scale, where nothing was tracked) keeps its

@@ -4,12 +4,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <limits>
 #include <optional>
 
 #include "contact/normal_force.hpp"
-#include "dynamics/parallel.hpp"
 #include "experiment/random_stream.hpp"
 #include "experiment/sample_window.hpp"
 
@@ -25,11 +23,6 @@ namespace {
 
 constexpr Window kAlways{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
 
-double sigma_of(const Series& series, std::size_t column, double otherwise) {
-  if (series.sigma.empty()) return otherwise;
-  return series.sigma[series.sigma.size() == 1 ? 0 : column];
-}
-
 void write_hand(const experiment::PreparedThrow& prepared, RandomStream random, datasets::HandLog& log) {
   const auto jumps = prepared.hand.jumps();
   for (std::size_t i = 0; i < log.time.rows; ++i) {
@@ -40,7 +33,8 @@ void write_hand(const experiment::PreparedThrow& prepared, RandomStream random, 
     const auto put = [&](Series& series, const std::array<double, 3>& row,
                          const std::array<double, 3>& used) {
       for (std::size_t k = 0; k < 3 && !series.data.empty(); ++k)
-        series.data[i * series.cols + k] = random.normal(row[k], sigma_of(series, k, used[k]));
+        series.data[i * series.cols + k] =
+            random.normal(row[k], series.sigma.empty() ? used[k] : series.sigma[k]);
     };
     const auto& [pose, twist, acceleration] = state;
     put(log.pose, {pose.x, pose.z, pose.theta}, prepared.hand_fit.pose_sigma);

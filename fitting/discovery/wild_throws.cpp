@@ -49,8 +49,7 @@ std::vector<double> spreads_for(const CampaignProblem& problem, const CampaignPr
 std::vector<WildGroup> wild_throws(const Stage& stage, const DiscoverOptions& options) {
   FootprintColumns columns(stage.problem, stage.fit);
   columns.add_effects(catalogue(options));
-  for (const auto& law : options.laws)
-    if (law != stage.problem.options().model) columns.add_law(law);
+  for (const auto& law : options.laws) columns.add_law(law);
   std::vector<GroupFooting> footings;
   for (const FitResult* fit : {&stage.fit, &stage.held_out})
     add_footings(columns, stage.problem, *fit, options.fit.threads, footings);

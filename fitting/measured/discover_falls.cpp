@@ -26,8 +26,7 @@ struct MeanResidual {
 MeanResidual mean_residual(const FallProblem& problem, const GroupedFit& fit) {
   MeanResidual out;
   std::array<std::vector<double>, 3> means;  // of the falls whose axis is used
-  for (std::size_t i = 0; i < fit.groups.size(); ++i) {
-    if (!fit.groups[i].used || !fit.groups[i].solved) continue;
+  for (const std::size_t i : fit.solved_groups()) {
     std::array<double, 3> mean{}, n{};
     const auto& rows = problem.groups()[i].rows;
     const Eigen::VectorXd left = problem.left_of(i, fit.groups[i].residual);
@@ -56,9 +55,8 @@ void weigh_start_speeds(const datasets::ThrowLog& log, const FallProblem& proble
                         MeasuredDiscovery& out) {
   constexpr double kFar = 2, kOpen = 0.5;  // sigma, in the mean of squares; of the speed in flight
   double n = 0, mean = 0, squares = 0, speeds = 0;
-  for (std::size_t i = 0; i < search.final.groups.size(); ++i) {
+  for (const std::size_t i : search.final.solved_groups()) {
     const GroupFit& g = search.final.groups[i];
-    if (!g.used || !g.solved) continue;
     const auto& rows = problem.groups()[i].rows;
     std::size_t speed = 0;  // the first row of what is known beforehand
     while (rows[speed].channel != kPriorChannel) ++speed;

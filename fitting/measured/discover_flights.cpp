@@ -269,9 +269,7 @@ void weigh_declared_drag(const datasets::ThrowLog& log, const FlightProblem& pro
   const std::string drag = "flight.quadratic_drag";
   const bool declared = std::any_of(log.objects.begin(), log.objects.end(),
                                     [](const auto& object) { return object.second.drag_k.value_or(0) > 0; });
-  if (!out.unexplained || !declared ||
-      std::any_of(out.effects.begin(), out.effects.end(), [&](const auto& e) { return e.id == drag; }))
-    return;
+  if (!out.unexplained || !declared || is_accepted(drag, out.effects)) return;
   for (const auto& [parameter, value, sigma] : asked_beside(problem, search.final, drag, options))
     for (const auto& [name, object] : log.objects)
       if (parameter.short_name == "k[" + name + "]" && value < 0 && object.drag_k.value_or(0) > 0)

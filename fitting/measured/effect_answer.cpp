@@ -9,10 +9,6 @@ namespace unhand::fitting {
 
 using Eigen::Index;
 
-bool EffectAnswer::has(const std::string& id) const {
-  return std::any_of(effects.begin(), effects.end(), [&](const auto& e) { return e.id == id; });
-}
-
 std::vector<std::string> EffectAnswer::ids_without(const std::string& id) const {
   std::vector<std::string> out;
   for (const auto& effect : effects)
@@ -30,7 +26,8 @@ std::vector<dynamics::Effect> EffectAnswer::candidates(const GroupedProblem& pro
                                                        const std::vector<dynamics::Effect>& catalogue) const {
   std::vector<dynamics::Effect> out;
   for (const auto& effect : catalogue)
-    if (!has(effect.id) && std::find(barred.begin(), barred.end(), effect.id) == barred.end() &&
+    if (!is_accepted(effect.id, effects) &&
+        std::find(barred.begin(), barred.end(), effect.id) == barred.end() &&
         problem.may_act(effect.id, ids_without({})))
       out.push_back(effect);
   return out;

@@ -19,8 +19,6 @@ struct EffectAnswer {
   std::map<std::string, std::size_t> shown_from;  ///< after how many effects one first had a footprint
   std::vector<std::string> barred;                ///< ids that may not be accepted (again)
 
-  /// Whether the effect was accepted.
-  bool has(const std::string& id) const;
   /// The accepted ids, in their order, but for this one.
   std::vector<std::string> ids_without(const std::string& id) const;
   /// Whether another accepted effect is nothing without this one: a wind without its drag.

@@ -1,7 +1,6 @@
 #include "fitting/measured/effect_description.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "dynamics/dense_solve.hpp"
 #include "fitting/measured/grouped_footprints.hpp"
@@ -83,9 +82,7 @@ std::vector<Stability> stability_of(const GroupedProblem& problem, const EffectA
   const GroupedFit& fit = answer.train;
   if (fit.shared.empty()) return out;
   const auto f = grouped_footprints(problem, fit, {}, options.fit);
-  std::vector<std::size_t> used;
-  for (std::size_t i = 0; i < fit.groups.size(); ++i)
-    if (fit.groups[i].used && fit.groups[i].solved) used.push_back(i);
+  const auto used = fit.solved_groups();
   std::vector<Index> columns;
   for (std::size_t k = 0; k < f.total.fitted; ++k) columns.push_back(static_cast<Index>(k));
   for (std::size_t c = 0; c < problem.covariates().size(); ++c) {

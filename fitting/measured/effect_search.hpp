@@ -1,8 +1,6 @@
 // Search for effects over groups: which one leaves such a residual, and do held-out groups agree?
 #pragma once
 
-#include <optional>
-
 #include "fitting/discovery/ranking.hpp"
 #include "fitting/measured/grouped_fit.hpp"
 

@@ -7,7 +7,6 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <optional>
 #include <set>
 #include <stdexcept>
 #include <utility>
@@ -293,9 +292,8 @@ Eigen::VectorXd FallProblem::response(std::size_t group,
 FallErrors fall_errors(const FallProblem& problem, const GroupedFit& fit) {
   FallErrors out;
   double squares = 0, n = 0;
-  for (std::size_t i = 0; i < fit.groups.size(); ++i) {
+  for (const std::size_t i : fit.solved_groups()) {
     const GroupFit& g = fit.groups[i];
-    if (!g.used || !g.solved) continue;
     const auto& rows = problem.groups()[i].rows;
     Vec3<double> speed{}, position{}, last{};
     double before = 0;

@@ -10,8 +10,8 @@ namespace unhand::fitting {
 ///
 /// Own unknowns of a fall: the speed at its first sample, a turn of the vertical (in body axes) against where
 /// it stood at rest before, and its turning rate; each known beforehand to what the recording before the fall
-/// says of it. (The vertical is what the sensor reads at rest without its bias.) A gyroscope, where there is
-/// one, gives ω; without, ω of the last term is taken as zero.
+/// says of it. (The vertical is what the sensor reads at rest without its bias.) The turning rate is what a
+/// gyroscope has not seen; without one, the terms of a lever arm are zero.
 ///
 /// The noise of an axis is the declared one or that of its third differences, and not below what rounding to
 /// the grid of its readings adds. An axis that says nothing of a fall, as it stands still or is cut off, is

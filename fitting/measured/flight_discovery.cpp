@@ -240,9 +240,7 @@ FlightErrors flight_errors(const FlightProblem& problem, const GroupedFit& fit, 
   constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();
   const int positions = problem.position_channels();
   FlightErrors out;
-  std::vector<std::size_t> used;
-  for (std::size_t i = 0; i < fit.groups.size(); ++i)
-    if (fit.groups[i].used && fit.groups[i].solved) used.push_back(i);
+  const auto used = fit.solved_groups();
   struct One {
     double squares{}, n{}, position{}, angle{};
     bool solved{}, oriented{};

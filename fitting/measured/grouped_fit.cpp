@@ -17,6 +17,13 @@ std::vector<std::string> GroupedFit::names() const {
   return out;
 }
 
+std::vector<std::size_t> GroupedFit::solved_groups() const {
+  std::vector<std::size_t> out;
+  for (std::size_t i = 0; i < groups.size(); ++i)
+    if (groups[i].used && groups[i].solved) out.push_back(i);
+  return out;
+}
+
 namespace {
 
 /// Every group of the split, from its start or from where it was in `near`.
@@ -139,9 +146,8 @@ std::vector<GroupedMisfit> misfit(const GroupedProblem& problem, const GroupedFi
                                   const GroupedWeights* weights) {
   std::vector<GroupedMisfit> out;
   for (const auto& name : problem.channels()) out.push_back({name, 0, 0, 0});
-  for (std::size_t i = 0; i < fit.groups.size(); ++i) {
+  for (const std::size_t i : fit.solved_groups()) {
     const GroupFit& g = fit.groups[i];
-    if (!g.used || !g.solved) continue;
     for (Index j = 0; j < g.residual.size(); ++j)
       if (const int c = problem.groups()[i].rows[static_cast<std::size_t>(j)].channel; c >= 0) {
         GroupedMisfit& of = out[static_cast<std::size_t>(c)];

@@ -49,9 +49,11 @@ struct GroupedFit {
   GroupedWeights weights;                ///< as at the answer
   double chi2{};                         ///< of the groups used, not robust
   long samples{}, degrees_of_freedom{};  ///< measurements; those minus unknowns
-  int used{}, iterations{};              ///< groups
+  int used{}, iterations{};              ///< groups; of the solver
   /// Of the shared parameters.
   std::vector<std::string> names() const;
+  /// The places of the groups that took part and are solved.
+  std::vector<std::size_t> solved_groups() const;
   /// 1 σ of shared parameter k; from the covariance.
   double sigma(std::size_t k) const {
     return std::sqrt(covariance(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(k)));
@@ -78,8 +80,7 @@ GroupedFit fit_own(const GroupedProblem& problem, datasets::Split split, const G
 GroupFit fit_own_part(const GroupedProblem& problem, std::size_t group, const GroupedFit& fit,
                       const std::function<bool(const GroupRow&)>& use);
 
-/// Weighted equations with the own unknowns projected out of every column: F̃ = F − O (OᵀO)⁺ Oᵀ F. Returns the
-/// factor on rows, too.
+/// Weighted equations with the own unknowns projected out of every column: F̃ = F − O (OᵀO)⁺ Oᵀ F.
 struct ProjectedEquations {
   bool solved{};              ///< false: the equations are not finite
   Eigen::MatrixXd columns;    ///< shared, then the residual last

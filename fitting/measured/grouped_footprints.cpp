@@ -1,7 +1,6 @@
 #include "fitting/measured/grouped_footprints.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "dynamics/dense_solve.hpp"
 #include "dynamics/parallel.hpp"
@@ -68,15 +67,13 @@ GroupedFootprints grouped_footprints(const GroupedProblem& problem, const Groupe
     }
   }
   const auto w = static_cast<Index>(width) + 1;
-  std::vector<std::size_t> used;
-  for (std::size_t i = 0; i < fit.groups.size(); ++i)
-    if (fit.groups[i].used && fit.groups[i].solved) used.push_back(i);
-  out.parts.assign(used.size(), MatrixXd());
+  const auto used = fit.solved_groups();
+  out.parts.resize(used.size());
   dynamics::parallel_for(used.size(), options.threads, [&](std::size_t n) {
     const std::size_t i = used[n];
     MatrixXd columns = MatrixXd::Zero(static_cast<Index>(problem.groups()[i].rows.size()), w);
     bool solved = true;
-    for (std::size_t c = 0; c < calls.size() && solved; ++c) {
+    for (std::size_t c = 0; c < calls.size(); ++c) {
       const auto e = projected(problem, i, calls[c].names, calls[c].values, fit.groups[i].own, fit.weights,
                                options.sample_limit);
       solved = e.solved;

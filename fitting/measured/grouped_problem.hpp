@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <limits>
 #include <map>
 #include <span>
 #include <string>

@@ -83,9 +83,8 @@ GroupedWeights learned_weights(const GroupedProblem& problem, const GroupedFit& 
   GroupedWeights out = neutral_weights(problem);
   std::vector<Channel> channels(problem.channels().size());
   std::vector<double> means;
-  for (std::size_t i = 0; i < fit.groups.size(); ++i) {
+  for (const std::size_t i : fit.solved_groups()) {
     const GroupFit& g = fit.groups[i];
-    if (!g.used || !g.solved) continue;
     std::vector<double> before(channels.size());
     for (Index j = 0; j < g.residual.size(); ++j) {
       const int c = problem.groups()[i].rows[static_cast<std::size_t>(j)].channel;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <set>
 
+#include "fitting/card.hpp"
 #include "fitting/measured/fall_discovery.hpp"
 #include "fitting/measured/flight_discovery.hpp"
 
@@ -36,17 +37,12 @@ GroupedFit given_by(const ModelCard& card, const std::string& file, const Groupe
           fmt::format("{} does not act on this log's throws; what does is {}", id, fmt::join(ids, ", ")));
     }
     for (auto& p : shared_parameters(*effect, objects_of(problem))) {
-      const std::string path = "/parameters/" + p.name;
       const auto found = card.parameters.find(p.name);
       if (found == card.parameters.end())
-        throw CardError(file, path, fmt::format("is missing: {} takes it on this log", id));
-      const auto& [value, unit] = std::pair(found->second.value, found->second.unit);
-      if (unit != p.unit)
-        throw CardError(file, path + "/unit", fmt::format("is '{}', not '{}'", unit, p.unit));
-      if (!(value >= p.low && value <= p.high))
-        throw CardError(file, path + "/value",
-                        fmt::format("{} is not in [{}, {}] {}", value, p.low, p.high, p.unit));
-      values.push_back(value);
+        throw CardError(file, "/parameters/" + p.name,
+                        fmt::format("is missing: {} takes it on this log", id));
+      require_parameter(file, p.name, found->second, p.unit, p.low, p.high);
+      values.push_back(found->second.value);
       out.shared.push_back(std::move(p));
     }
   }

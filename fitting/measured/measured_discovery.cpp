@@ -26,9 +26,8 @@ namespace {
 double without_strays(const GroupedProblem& problem, const GroupedFit& fit, std::size_t channel) {
   constexpr double kFar = 10, kFew = 0.01;
   std::vector<double> sizes;
-  for (std::size_t i = 0; i < fit.groups.size(); ++i) {
+  for (const std::size_t i : fit.solved_groups()) {
     const GroupFit& g = fit.groups[i];
-    if (!g.used || !g.solved) continue;
     for (Eigen::Index j = 0; j < g.residual.size(); ++j)
       if (problem.groups()[i].rows[static_cast<std::size_t>(j)].channel == static_cast<int>(channel))
         sizes.push_back(std::abs(g.residual[j]));
@@ -199,9 +198,6 @@ EffectSearch run_search(GroupedProblem& problem, const MeasuredOptions& options,
 }
 
 void weigh_conditions(const EffectSearch& search, MeasuredDiscovery& out) {
-  const auto stands = [&](const std::string& id) {
-    return std::any_of(out.effects.begin(), out.effects.end(), [&](const auto& e) { return e.id == id; });
-  };
   const auto is_told =
       [&](const SizeShift& s) {  // and not in other lengths, those of a scale that is gravity
         for (const auto& effect : out.effects)
@@ -219,7 +215,7 @@ void weigh_conditions(const EffectSearch& search, MeasuredDiscovery& out) {
            false});
       continue;
     }
-    if (!c.instead_of.empty() && !stands(c.instead_of)) continue;
+    if (!c.instead_of.empty() && !is_accepted(c.instead_of, out.effects)) continue;
     const std::string how =
         c.instead_of.empty()
             ? fmt::format("{} is evident beside it (BIC {:.1f}), though held-out groups do not confirm that",
@@ -264,11 +260,9 @@ std::vector<AskedBeside> asked_beside(const GroupedProblem& problem, const Group
 void weigh_drag_form(const GroupedProblem& problem, const EffectSearch& search,
                      const MeasuredOptions& options, MeasuredDiscovery& out) {
   const std::string quadratic = "flight.quadratic_drag", linear = "flight.linear_drag";
-  const auto has = [&](const std::string& id) {
-    return std::any_of(out.effects.begin(), out.effects.end(), [&](const auto& e) { return e.id == id; });
-  };
-  if (has(quadratic) == has(linear)) return;
-  const std::string &is = has(quadratic) ? quadratic : linear, &other = has(quadratic) ? linear : quadratic;
+  const bool squared = is_accepted(quadratic, out.effects);
+  if (squared == is_accepted(linear, out.effects)) return;
+  const std::string &is = squared ? quadratic : linear, &other = squared ? linear : quadratic;
   for (const auto& [parameter, value, sigma] : asked_beside(problem, search.final, other, options)) {
     const char* form = is == linear ? (value > 0 ? "grows faster than v" : "grows less than v")
                                     : (value > 0 ? "grows less than v²" : "grows faster than v²");

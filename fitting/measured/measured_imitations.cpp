@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "fitting/gross_outliers.hpp"
 #include "fitting/measured/effect_trial.hpp"
 #include "fitting/measured/grouped_weights.hpp"
-#include "fitting/measured/wild_groups.hpp"
 
 namespace unhand::fitting {
 
@@ -103,8 +103,7 @@ bool leave_more_than_they_take(const std::vector<MeasuredMisfit>& misfit) {
 std::vector<double> weighed_misfit(const GroupedProblem& problem, const GroupedFit& fit,
                                    const GroupedWeights& weights) {
   std::vector<double> out;
-  for (const GroupedMisfit& m : misfit(problem, fit, &weights))
-    out.push_back(m.weight > 0 ? m.chi2 / m.weight : 0);
+  for (const GroupedMisfit& m : misfit(problem, fit, &weights)) out.push_back(m.chi2_per_sample());
   return out;
 }
 
@@ -112,8 +111,7 @@ std::vector<double> weighed_misfit(const GroupedProblem& problem, const GroupedF
 bool are_exceptions(const EffectSearch& search) {
   double all = 0, less = 0;
   for (const GroupedFit* fit : {&search.final, &search.final_test})
-    for (std::size_t i = 0; i < fit->groups.size(); ++i)
-      if (fit->groups[i].used && fit->groups[i].solved) all += 1, less += fit->weights.group[i] < 1 ? 1 : 0;
+    for (const std::size_t i : fit->solved_groups()) all += 1, less += fit->weights.group[i] < 1 ? 1 : 0;
   return less <= std::max(1.0, kMostWild * all);
 }
 

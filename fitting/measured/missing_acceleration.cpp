@@ -8,12 +8,10 @@
 #include "dynamics/dense_solve.hpp"
 #include "dynamics/parallel.hpp"
 #include "fitting/hat.hpp"
-#include "fitting/measured/grouped_weights.hpp"
 
 namespace unhand::fitting {
 
-using dynamics::definite_solve, dynamics::gram, dynamics::inner_products, dynamics::pseudo_inverse,
-    dynamics::product;
+using dynamics::gram, dynamics::inner_products, dynamics::pseudo_inverse, dynamics::product;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -77,8 +75,7 @@ struct Seen {
 
 std::vector<Seen> seen_in(const GroupedProblem& problem, const GroupedFit& fit, int threads) {
   std::vector<Seen> out;
-  for (std::size_t i = 0; i < fit.groups.size(); ++i)
-    if (fit.groups[i].used && fit.groups[i].solved) out.push_back({i, {}, {}});
+  for (const std::size_t i : fit.solved_groups()) out.push_back({i, {}, {}});
   const auto names = fit.names();
   const std::vector<double> values(fit.values.data(), fit.values.data() + fit.values.size());
   dynamics::parallel_for(out.size(), threads, [&](std::size_t n) {

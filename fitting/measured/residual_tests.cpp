@@ -13,17 +13,6 @@ namespace unhand::fitting {
 
 using Eigen::Index;
 
-namespace {
-
-std::vector<std::size_t> used_groups(const GroupedFit& fit) {
-  std::vector<std::size_t> out;
-  for (std::size_t i = 0; i < fit.groups.size(); ++i)
-    if (fit.groups[i].used && fit.groups[i].solved) out.push_back(i);
-  return out;
-}
-
-}  // namespace
-
 std::vector<Autocorrelation> autocorrelation(const GroupedProblem& problem, const GroupedFit& fit) {
   const std::size_t channels = problem.channels().size();
   std::vector<double> products(channels), expected(channels), squares(channels), kept(channels),
@@ -32,7 +21,7 @@ std::vector<Autocorrelation> autocorrelation(const GroupedProblem& problem, cons
   const std::vector<double> values(fit.values.data(), fit.values.data() + fit.values.size());
   GroupedWeights plain = fit.weights;
   for (double& scale : plain.channel_scale) scale = 1e6;
-  for (const std::size_t i : used_groups(fit)) {
+  for (const std::size_t i : fit.solved_groups()) {
     const auto e = projected(problem, i, names, values, fit.groups[i].own, plain, 6);
     if (!e.solved) continue;
     const auto& rows = problem.groups()[i].rows;
@@ -70,7 +59,7 @@ std::vector<ResidualProfile> residual_profile(const GroupedProblem& problem, con
     double n{}, sum{}, squares{}, groups{}, group_squares{};
   };
   std::vector<Bin> all(problem.channels().size() * static_cast<std::size_t>(bins));
-  for (const std::size_t i : used_groups(fit)) {
+  for (const std::size_t i : fit.solved_groups()) {
     const auto& rows = problem.groups()[i].rows;
     double longest = 0;
     for (const auto& row : rows) longest = std::max(longest, row.time);
@@ -103,7 +92,7 @@ std::vector<ResidualProfile> residual_profile(const GroupedProblem& problem, con
 LeavesNoise leaves_noise(const GroupedProblem& problem, const GroupedFit& fit, double limit, int threads) {
   constexpr std::size_t kMostGroups = 100;  // evenly spaced ones say it as well
   constexpr std::array kShares{0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0};
-  auto used = used_groups(fit);
+  auto used = fit.solved_groups();
   if (used.size() > kMostGroups) {
     std::vector<std::size_t> some;
     for (std::size_t k = 0; k < kMostGroups; ++k) some.push_back(used[k * used.size() / kMostGroups]);

@@ -19,8 +19,7 @@ void add_parts(const GroupedProblem& problem, GroupedFit fit, const std::vector<
   fit.weights.group.assign(fit.groups.size(), 1.0);
   auto f = grouped_footprints(problem, fit, effects, options);
   std::size_t at = 0;
-  for (std::size_t i = 0; i < fit.groups.size(); ++i) {
-    if (!fit.groups[i].used || !fit.groups[i].solved) continue;
+  for (const std::size_t i : fit.solved_groups()) {
     MatrixXd& gram = f.parts[at++];
     const Index r = gram.rows() - 1;
     if (fit.groups[i].n > 0 && gram(r, r) > 0)

@@ -1,4 +1,4 @@
-// Flights, falls or slips that err as no other does.
+// Flights or falls that err as no other does.
 #pragma once
 
 #include <vector>

@@ -118,8 +118,8 @@ std::vector<std::vector<SurfaceScore>> compare_surfaces(const std::vector<SlipSa
   dynamics::parallel_for(results.size(), options.threads, [&](std::size_t job) {
     const std::size_t pair = job / rounds, round = job % rounds, i = pair / models.size();
     const SurfaceModel model = models[pair % models.size()];
-    if (round == 0) fits[pair] = fit_surface(surfaces[i], model);
     if (round == 0)
+      fits[pair] = fit_surface(surfaces[i], model),
       results[job] = cross_validate(surfaces[i], model, options.folds);
     else if (nulls[i].fitted())
       results[job] =

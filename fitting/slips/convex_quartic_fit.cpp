@@ -15,10 +15,6 @@ using Sym3 = Eigen::Matrix3d;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-Sym3 sym_of(const std::array<double, 6>& s) {
-  return Sym3{{s[0], s[1], s[2]}, {s[1], s[3], s[4]}, {s[2], s[4], s[5]}};
-}
-
 double value_of(double x) { return x; }
 template <int N>
 double value_of(const dynamics::DualOf<N>& x) {
@@ -38,7 +34,7 @@ struct ConvexityResidual {
     const std::array<T, 6> s = adjugate_sum(p);
     std::array<double, 6> value;
     for (std::size_t i = 0; i < 6; ++i) value[i] = value_of(s[i]);
-    const Spectrum found = spectrum(sym_of(value));
+    const Spectrum found = spectrum(symmetric(value));
     for (int k = 0; k < 3; ++k) {
       r[k] = T(0);
       if (!(found.values[k] > 0)) continue;
@@ -111,7 +107,8 @@ struct Ball {
 /// semidefinite.
 Squares made_convex(const Squares& p, const Matrix6& ball) {
   const Matrix6 gram = gram_of(p);
-  const Sym3 inside = sym_of(adjugate_sum(squares_of(ball).data())), own = sym_of(adjugate_sum(p.data()));
+  const Sym3 inside = symmetric(adjugate_sum(squares_of(ball).data())),
+             own = symmetric(adjugate_sum(p.data()));
   const double margin = 1e-9 * own.norm();
   double low = 0, high = 1;
   if (least_eigenvalue(own) < margin)
@@ -132,7 +129,7 @@ QuarticSolution solve_quartic(const std::vector<SlipSample>& samples, const std:
   const Ball ball(ellipsoid);
   QuarticSolution out;
   out.p = squares_of(ball.squared + 0.01 * ball.spread);
-  const double size = sym_of(adjugate_sum(out.p.data())).norm();
+  const double size = symmetric(adjugate_sum(out.p.data())).norm();
   ConvexityResidual convexity;
   convexity.penalty = 1e3 / (size * size);
   constexpr int turns = 16, noise_turns = 10;
@@ -150,7 +147,7 @@ QuarticSolution solve_quartic(const std::vector<SlipSample>& samples, const std:
     out.iterations += solved.iterations;
     out.usable = solved.usable;
     if (!solved.usable) return out;
-    const Sym3 reached = sym_of(adjugate_sum(out.p.data()));
+    const Sym3 reached = symmetric(adjugate_sum(out.p.data()));
     const double gap = std::max(0.0, -least_eigenvalue(reached)) / size;
     convexity.update(reached);
     if (gap > 0.25 * last_gap) convexity.penalty *= 4;

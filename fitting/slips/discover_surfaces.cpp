@@ -13,6 +13,8 @@
 namespace unhand::fitting {
 namespace {
 
+constexpr double kNoNoise = std::numeric_limits<double>::quiet_NaN();  // is declared, to compare with
+
 std::string id_of(SurfaceModel model) { return "contact.law:" + to_string(model); }
 
 using Scores = std::vector<std::vector<SurfaceScore>>;  // by surface, then model; the base is the first
@@ -169,7 +171,6 @@ void accept_law(const LawScore& law, bool controlled, SurfaceDiscovery& out) {
 
 /// Writes that friction depends on speed, or says what else the levels depend on.
 void judge_levels(const LevelAnswer& levels, MeasuredDiscovery& answer) {
-  constexpr double kNoNoise = std::numeric_limits<double>::quiet_NaN();
   if (!levels.found.empty() && !answer.first.any) answer.first = {true, 0, "level", kNoNoise};
   for (const LevelDependence& one : levels.found) {
     if (const std::string id = level_effect(one.by); !id.empty()) {
@@ -273,7 +274,6 @@ void judge_residuals(const LawScore& law, const LawScore& base, double unexplain
                    "{:.3f} ({:.3f} ± {:.3f} before)",
                    law.left.mean(), law.left.error(), base.left.mean(), base.left.error()),
        is_common(law.left)});
-  constexpr double kNoNoise = std::numeric_limits<double>::quiet_NaN();  // is declared, to compare with
   // A law or a bias that was accepted lowers the error of directions.
   answer.first = {is_common(base.left) || !answer.effects.empty(), 0, "direction", kNoNoise};
   if (is_common(law.left))

@@ -59,15 +59,10 @@ Paired left_by(const SlipSamples& slips, const SlipSurface& surface, double& cor
   return out;
 }
 
-double in_sample(const SlipSamples& slips, const SlipSurface& surface) {
+/// Over the samples; 0 without any.
+double mean_of(const SlipSamples& slips, const auto& error_of) {
   double out = 0;
-  for (const auto& s : slips.samples) out += kDegreesPerRadian * direction_error(surface, s);
-  return slips.samples.empty() ? 0 : out / static_cast<double>(slips.samples.size());
-}
-
-double level_error(const SlipSamples& slips, const SlipSurface& surface) {
-  double out = 0;
-  for (const auto& s : slips.samples) out += std::abs(surface.gauge(s.wrench) - 1);
+  for (const SlipSample& s : slips.samples) out += error_of(s);
   return slips.samples.empty() ? 0 : out / static_cast<double>(slips.samples.size());
 }
 
@@ -91,8 +86,10 @@ SurfaceEvidence LawScore::add(const SlipSamples& slips, const SurfaceScore& base
   better += score.mean_deg < base.mean_deg ? 1 : 0, ++compared;
   error += score.mean_deg, base_error += base.mean_deg;
   null_gain += base.null_control_deg - score.null_control_deg;
-  train += in_sample(slips, score.fit.surface);
-  level += level_error(slips, score.fit.surface);
+  const SlipSurface& surface = score.fit.surface;
+  train +=
+      mean_of(slips, [&](const SlipSample& s) { return kDegreesPerRadian * direction_error(surface, s); });
+  level += mean_of(slips, [&](const SlipSample& s) { return std::abs(surface.gauge(s.wrench) - 1); });
   return e;
 }
 

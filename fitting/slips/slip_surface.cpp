@@ -46,10 +46,6 @@ bool solve_ellipsoid(const std::vector<SlipSample>& samples,
   return true;
 }
 
-Eigen::Matrix3d matrix_of(const std::vector<double>& a) {
-  return Eigen::Matrix3d{{a[0], a[1], a[2]}, {a[1], a[3], a[4]}, {a[2], a[4], a[5]}};
-}
-
 /// Enough slips, and directions in all three dimensions?
 SurfaceFit check(const SlipSamples& slips, SurfaceModel model) {
   std::set<int> used;
@@ -171,7 +167,7 @@ double SlipSurface::gauge(const std::array<double, 3>& w) const {
     return std::sqrt(std::sqrt(value.h));
   }
   const Eigen::Vector3d x(w[0], w[1], w[2]);
-  return std::sqrt(x.dot(matrix_of(coefficients) * x));
+  return std::sqrt(x.dot(symmetric(coefficients) * x));
 }
 
 std::array<double, 3> SlipSurface::normal(const std::array<double, 3>& w) const {
@@ -180,7 +176,7 @@ std::array<double, 3> SlipSurface::normal(const std::array<double, 3>& w) const 
     const auto value = quartic_value(coefficients, w);
     g = {value.gradient[0], value.gradient[1], value.gradient[2]};
   } else {
-    g = matrix_of(coefficients) * Eigen::Vector3d(w[0], w[1], w[2]);
+    g = symmetric(coefficients) * Eigen::Vector3d(w[0], w[1], w[2]);
   }
   g /= g.norm();
   return {g[0], g[1], g[2]};

@@ -3,7 +3,9 @@
 
 #include <ceres/ceres.h>
 
+#include <Eigen/Core>
 #include <algorithm>
+#include <span>
 #include <vector>
 
 #include "dynamics/median.hpp"
@@ -103,6 +105,11 @@ SurfaceNoise noise_of(const std::vector<SlipSample>& samples, const double* p) {
 inline bool settled(const SurfaceNoise& a, const SurfaceNoise& b) {
   return std::abs(a.direction - b.direction) < 1e-3 * b.direction &&
          std::abs(a.level - b.level) < 1e-3 * b.level;
+}
+
+/// By its upper triangle, row by row.
+inline Eigen::Matrix3d symmetric(std::span<const double> a) {
+  return Eigen::Matrix3d{{a[0], a[1], a[2]}, {a[1], a[3], a[4]}, {a[2], a[4], a[5]}};
 }
 
 /// Σ_k (a_k · q(w))² with Σ_k adj(A_k) positive semidefinite, near or far from the ellipsoid |Bw|² = 1, B as

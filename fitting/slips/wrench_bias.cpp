@@ -21,11 +21,6 @@ constexpr double kAtRest = 0.1;
 /// Of the mean force: the longest step.
 constexpr double kFarthest = 0.3;
 
-/// (f_x, f_y, τ) as samples have it.
-Vector3d in_samples(const Vector3d& bias, double characteristic_length) {
-  return {bias[0], bias[1], bias[2] / characteristic_length};
-}
-
 /// n(w) − u and gauge(w) − 1, in units of their noise.
 Vector4d residual(const SlipSurface& surface, const SurfaceFit& fit, const SlipSample& s,
                   const Vector3d& bias) {
@@ -126,7 +121,7 @@ std::vector<SlipSamples> without_fold(std::vector<SlipSamples> surfaces, int fol
 }  // namespace
 
 SlipSamples without_bias(SlipSamples slips, const Vector3d& bias) {
-  const Vector3d b = in_samples(bias, slips.characteristic_length);
+  const Vector3d b(bias[0], bias[1], bias[2] / slips.characteristic_length);
   for (SlipSample& s : slips.samples)
     for (std::size_t j = 0; j < 3; ++j) s.wrench[j] -= b[static_cast<Index>(j)];
   return slips;
@@ -174,11 +169,11 @@ WrenchBias fit_wrench_bias(const std::vector<SlipSamples>& surfaces, SurfaceMode
 std::vector<SurfaceScore> score_with_bias(const std::vector<SlipSamples>& surfaces, SurfaceModel model,
                                           const WrenchBias& whole, const SurfaceComparisonOptions& options) {
   std::vector<SurfaceScore> out(surfaces.size());
+  std::vector<std::vector<double>> errors(surfaces.size());
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
     out[i].model = model, out[i].outcome = SurfaceOutcome::fitted, out[i].fit = whole.fits[i];
+    errors[i].resize(surfaces[i].samples.size());
   }
-  std::vector<std::vector<double>> errors(surfaces.size());
-  for (std::size_t i = 0; i < surfaces.size(); ++i) errors[i].resize(surfaces[i].samples.size());
   std::vector<WrenchBias> folds(static_cast<std::size_t>(options.folds));
   dynamics::parallel_for(folds.size(), options.threads, [&](std::size_t k) {
     folds[k] =

@@ -6,7 +6,6 @@
 #include <cctype>
 #include <cmath>
 #include <map>
-#include <optional>
 #include <set>
 #include <sstream>
 #include <stdexcept>

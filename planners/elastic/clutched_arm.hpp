@@ -11,7 +11,6 @@
 // differences of coordinates, ξ̇ = Z_p ν with a constant Z_p, and Z_pᵀ Π Z_p ν̇ = Z_pᵀ f.
 #pragma once
 
-#include <filesystem>
 #include <string>
 
 #include "planners/arm/dynamics.hpp"

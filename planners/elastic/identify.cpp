@@ -17,8 +17,8 @@ using control::kLinkParameters;
 using control::LinkParameters;
 using Joints = JointVector<double>;
 
+constexpr int kPasses = 3;  ///< of least squares
 /// Singular values below this share of the largest belong to combinations that no motion shows.
-constexpr int kPasses = 3;
 constexpr double kRank = 1e-9;
 
 /// π of a link from its ten log-Cholesky parameters (α, d₁, d₂, d₃, s₁₂, s₂₃, s₁₃, t₁, t₂, t₃).
@@ -205,8 +205,8 @@ IdentifiedInertia identify_inertia(const Chain& prior, const std::vector<MotionS
     if (!std::isfinite(one.q.sum() + one.qd.sum() + one.qdd.sum() + one.torque.sum()))
       throw std::invalid_argument(fmt::format("identify: sample {} is not finite", k));
     W.middleRows(n * static_cast<int>(k), n) =
-        control::torque_regressor<double>(prior, log[k].q, log[k].qd, log[k].qdd);
-    tau.segment(n * static_cast<int>(k), n) = log[k].torque;
+        control::torque_regressor<double>(prior, one.q, one.qd, one.qdd);
+    tau.segment(n * static_cast<int>(k), n) = one.torque;
   }
   IdentifiedInertia out;
   out.condition = condition_of(dynamics::singular_vectors(W, tau).values);

@@ -175,12 +175,13 @@ namespace {
 
 /// A torque term whose last variables are the `motors` torques at a node, or at both nodes beside a middle:
 /// their mean is taken from the first outputs.
+template <int Outputs = kLinks>
 TermPointer torques(std::vector<int> v, std::vector<int> slots, const ClutchedArm& arm,
                     std::vector<Linear> linear_part, int base, int motors) {
   const int sets = (static_cast<int>(v.size()) - base) / motors;
   for (int k = 0; k < sets * motors; ++k) linear_part.push_back({k % motors, base + k, -1.0 / sets});
-  return std::make_unique<SlotTerm<JointTorques<kLinks>>>(std::move(v), std::move(slots),
-                                                          JointTorques<kLinks>{&arm}, std::move(linear_part));
+  return std::make_unique<SlotTerm<JointTorques<Outputs>>>(
+      std::move(v), std::move(slots), JointTorques<Outputs>{&arm}, std::move(linear_part));
 }
 
 }  // namespace
@@ -210,11 +211,7 @@ TermPointer passive_torques(std::vector<int> v, const ClutchedArm& arm) {
                  10, 2);
 }
 TermPointer locked_torques(std::vector<int> v, const ClutchedArm& arm) {
-  std::vector<Linear> drives;
-  const int sets = (static_cast<int>(v.size()) - 7) / 2;
-  for (int k = 0; k < 2 * sets; ++k) drives.push_back({k % 2, 7 + k, -1.0 / sets});
-  return std::make_unique<SlotTerm<JointTorques<2>>>(std::move(v), std::vector{0, 1, 2, 3, 4, 6, 7},
-                                                     JointTorques<2>{&arm}, std::move(drives));
+  return torques<2>(std::move(v), {0, 1, 2, 3, 4, 6, 7}, arm, {}, 7, 2);
 }
 TermPointer rigid_torques(std::vector<int> v, const ClutchedArm& arm) {
   return torques(std::move(v), {0, 1, 2, 3, 4, 5, 6, 7, 8}, arm,

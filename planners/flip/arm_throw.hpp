@@ -2,7 +2,6 @@
 // braking, and the hand that it moves.
 #pragma once
 
-#include <optional>
 #include <random>
 #include <span>
 

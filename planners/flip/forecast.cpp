@@ -91,9 +91,9 @@ ReleaseCard prior_card(const FlipRobot& robot, const std::string& law) {
 }
 
 std::optional<FlipRelease> predicted_release(const release::HandMotion& hand, const ReleaseCard& card,
-                                             const Bar& bar) {
+                                             const Bar& bar, double angle) {
   return release_bar(hand, {bar,
-                            0.0,
+                            angle,
                             {card.grip_force, card.dead_time.value, card.opening_time.value, card.shape},
                             {card.model, card.mu.value, card.length, card.pads, card.law_values}});
 }

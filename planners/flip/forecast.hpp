@@ -3,8 +3,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <map>
-#include <memory>
 #include <vector>
 
 #include "planners/flip/learner.hpp"
@@ -51,9 +49,10 @@ class HandLibrary {
 /// its uncertainty. `law` is the contact model that the card names.
 ReleaseCard prior_card(const FlipRobot& robot, const std::string& law = "sliding_pivot");
 
-/// The release of a bar that a card predicts for a hand's motion.
+/// The release of a bar that a card predicts for a hand's motion; `angle` is the bar's against the hand
+/// [rad].
 std::optional<FlipRelease> predicted_release(const release::HandMotion& hand, const ReleaseCard& card,
-                                             const Bar& bar);
+                                             const Bar& bar, double angle = 0);
 
 /// Where the robot as it is declared, pads and all, lands the library's bar without noise: one entry for each
 /// of the library's commands, empty where the bar is not let go in time or never lands.

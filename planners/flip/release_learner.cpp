@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <numeric>
 #include <stdexcept>
 
 #include "dynamics/dense_solve.hpp"
@@ -170,11 +169,7 @@ std::optional<PredictedDetach> predicted_detach(const release::HandMotion& hand,
   const auto let_go = [&](const ReleaseCard& card, double offset, double angle) {
     Bar held = bar;
     held.com_offset += offset;
-    const auto release =
-        release_bar(hand, {held,
-                           angle,
-                           {card.grip_force, card.dead_time.value, card.opening_time.value, card.shape},
-                           {card.model, card.mu.value, card.length, card.pads, card.law_values}});
+    const auto release = predicted_release(hand, card, held, angle);
     return release ? std::optional(release->detach) : std::nullopt;
   };
   const auto changed = [&](const Eigen::Vector4d& by) {

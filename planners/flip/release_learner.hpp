@@ -3,7 +3,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <map>
 
 #include "planners/flip/forecast.hpp"
 

@@ -1,7 +1,6 @@
 // Where and how fast the arm should be when the gripper opens.
 #pragma once
 
-#include <cstdint>
 #include <vector>
 
 #include "flight/flow_map.hpp"

@@ -8,8 +8,6 @@
 #include <limits>
 #include <stdexcept>
 
-#include "contact/registry.hpp"
-
 namespace unhand::contact {
 namespace {
 

@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <vector>
 
 #include "contact/registry.hpp"
 #include "release/naive_release.hpp"

@@ -5,7 +5,6 @@
 #include <iomanip>
 #include <random>
 #include <sstream>
-#include <stdexcept>
 
 #include "log_samples.hpp"
 

@@ -7,11 +7,9 @@
 #include <bit>
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <random>
-#include <sstream>
 
 #include "tests/support/refusal.hpp"
 #include "tests/support/scratch.hpp"

@@ -1,6 +1,5 @@
 // Derivatives through events: dual numbers against closed forms and against central differences over powers
 // of ten.
-#include <functional>
 
 #include "tests/dynamics/every_method.hpp"
 #include "tests/support/best_difference.hpp"

@@ -17,7 +17,6 @@ auto smooth_problem() {
   return free_flow([](int, const auto& t, const auto& y, auto& dy) {
     using std::cos;
     using std::sin;
-    using std::exp;
     const auto c = cos(t), s = sin(t);
     dy[0] = y[0] * c + 0.5 * (y[1] - c - y[0] * y[0]);
     dy[1] = -s + 2.0 * y[0] * dy[0] - (y[1] - c - y[0] * y[0]);

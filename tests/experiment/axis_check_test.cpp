@@ -19,11 +19,7 @@ using datasets::Throw;
 using datasets::ThrowLog;
 using testing::HasSubstr;
 using testing::IsEmpty;
-
-const ThrowLog& small_log() {
-  static const ThrowLog log = generate_campaign(testing_support::small_design("limit_surface_disc"), 5);
-  return log;
-}
+using testing_support::small_log;
 
 void scale_column(Series& series, double factor, std::size_t column) {
   for (std::size_t i = 0; i < series.rows; ++i) series(i, column) *= factor;

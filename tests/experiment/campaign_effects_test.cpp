@@ -6,7 +6,6 @@
 
 #include <cmath>
 #include <functional>
-#include <numbers>
 
 #include "dynamics/parallel.hpp"
 #include "tests/support/perfect_campaign.hpp"

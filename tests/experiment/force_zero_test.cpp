@@ -11,7 +11,7 @@ namespace unhand::experiment {
 namespace {
 
 datasets::ThrowLog offset_log(double level) {
-  auto log = generate_campaign(testing_support::small_design("limit_surface_disc"), 5);
+  auto log = testing_support::small_log();
   for (auto& one : log.throws)
     for (double& f : one.ft->normal_force.data) f += level;
   return log;

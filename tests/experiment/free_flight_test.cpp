@@ -6,8 +6,6 @@
 
 #include <Eigen/Dense>
 #include <cmath>
-#include <numbers>
-#include <random>
 
 #include "datasets/import_cube_tosses.hpp"
 #include "flight/fly.hpp"

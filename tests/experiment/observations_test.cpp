@@ -9,7 +9,6 @@
 #include <random>
 
 #include "contact/patch.hpp"
-#include "dynamics/quantisation.hpp"
 #include "tests/support/perfect_campaign.hpp"
 
 namespace {

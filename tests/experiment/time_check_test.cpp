@@ -14,11 +14,7 @@ using testing::ElementsAre;
 using testing::Field;
 using testing::HasSubstr;
 using testing::IsEmpty;
-
-const ThrowLog& small_log() {
-  static const ThrowLog log = generate_campaign(testing_support::small_design("limit_surface_disc"), 5);
-  return log;
-}
+using testing_support::small_log;
 
 auto note(const std::string& path, int throws) {
   return testing::AllOf(Field(&LogNote::path, path), Field(&LogNote::throws, throws));

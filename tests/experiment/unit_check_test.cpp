@@ -25,6 +25,7 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
+using testing_support::small_log;
 
 constexpr double kDegree = 180 / std::numbers::pi, kGravity = 9.80665;
 
@@ -32,11 +33,6 @@ constexpr double kDegree = 180 / std::numbers::pi, kGravity = 9.80665;
 void expect_refused(const ThrowLog& log, const testing::Matcher<std::string>& why,
                     const std::string& of = "") {
   EXPECT_THAT([&] { require_units(log, "log.h5"); }, testing::ThrowsMessage<datasets::LogError>(why)) << of;
-}
-
-const ThrowLog& campaign() {
-  static const ThrowLog log = generate_campaign(testing_support::small_design("limit_surface_disc"), 5);
-  return log;
 }
 
 /// Columns first to last − 1 times `factor`.
@@ -51,7 +47,7 @@ TEST(UnitCheck, TellsOfAnglesThatAreWholeTurnsOff) {
     const auto doubts = unit_doubts(log);
     return doubts.size() == 1 ? doubts.front() : UnitDoubt{};
   };
-  auto log = campaign();
+  auto log = small_log();
   for (auto& one : log.throws) {  // wrapped half-way
     auto& pose = one.mocap->pose;
     const double cut = 0.5 * (pose(0, 2) + pose(pose.rows - 1, 2));
@@ -62,18 +58,18 @@ TEST(UnitCheck, TellsOfAnglesThatAreWholeTurnsOff) {
   EXPECT_THAT(told.reason, AllOf(HasSubstr("a jump of 1 turn"), HasSubstr("unwrapped")));
   EXPECT_EQ(told.throws, 12);
 
-  log = campaign();
+  log = small_log();
   for (auto& one : log.throws) one.landing->pose(0, 1) -= kTurn;
   told = doubt_of(log);
   EXPECT_EQ(told.path, "/throws/" + log.throws[0].id + "/landing/pose") << told.reason;
   EXPECT_THAT(told.reason, AllOf(HasSubstr("turns from it"), HasSubstr("12 throws")));
 
   for (const double turns : {-1.0, 1.0, 2.0}) {  // in one throw
-    log = campaign();
+    log = small_log();
     log.throws[3].landing->pose(0, 1) += turns * kTurn;
     told = doubt_of(log);
     EXPECT_EQ(told.path, "/throws/" + log.throws[3].id + "/landing/pose") << told.reason;
-    log = campaign();
+    log = small_log();
     auto& pose = log.throws[3].hand->pose;
     for (std::size_t i = pose.rows / 2; i < pose.rows; ++i) pose(i, 2) += turns * kTurn;
     told = doubt_of(log);
@@ -168,7 +164,7 @@ const Mistake kMistakes[] = {
 
 TEST(UnitCheck, NamesTheColumnAndTheUnitOfEveryMistake) {
   for (const auto& mistake : kMistakes) {
-    auto log = campaign();
+    auto log = small_log();
     for (auto& one : log.throws) mistake.make(one);
     const auto doubts = unit_doubts(log);
     ASSERT_FALSE(doubts.empty()) << mistake.name;
@@ -182,25 +178,25 @@ TEST(UnitCheck, NamesTheColumnAndTheUnitOfEveryMistake) {
 }
 
 TEST(UnitCheck, MassesInGramsShowInTheForce) {
-  auto log = campaign();
+  auto log = small_log();
   for (auto& [name, object] : log.objects) object.mass *= 1e3;
   expect_refused(log, HasSubstr("mass in g"));
 }
 
 TEST(UnitCheck, LeversInMillimetresShowInTheDistanceOfTheObject) {
-  auto log = campaign();
+  auto log = small_log();
   for (auto& [name, object] : log.objects) *object.com_offset *= 1e3;
   expect_refused(log, AllOf(HasSubstr("/objects/*@com_offset"), HasSubstr("mm for m")));
 }
 
 TEST(UnitCheck, NoPlanetPullsWithTenThousand) {
-  auto log = campaign();
+  auto log = small_log();
   log.gravity *= 1e3;
   expect_refused(log, AllOf(HasSubstr("/@gravity"), HasSubstr("mm/s²")));
 }
 
 TEST(UnitCheck, AnAngleThatTheTrackerDoesNotSeeIsRefused) {
-  auto log = campaign();
+  auto log = small_log();
   for (auto& one : log.throws)
     for (std::size_t i = 0; i < one.mocap->pose.rows; ++i) one.mocap->pose(i, 2) = 0;
   expect_refused(log, AllOf(HasSubstr("/throws/" + log.throws[0].id + "/mocap/pose"),
@@ -216,13 +212,13 @@ TEST(UnitCheck, AnAngleThatTheTrackerDoesNotSeeIsRefused) {
 }
 
 TEST(UnitCheck, AGraspAngleBeyondAWholeTurnIsInDegrees) {
-  auto log = campaign();
+  auto log = small_log();
   for (auto& one : log.throws) one.mocap.reset(), one.grasp_angle = -22;
   expect_refused(log, AllOf(HasSubstr("@grasp_angle"), HasSubstr("degrees for rad")));
 }
 
 TEST(UnitCheck, WithoutAnOpeningCommandTheForceTellsWhenItOpens) {
-  auto log = campaign();
+  auto log = small_log();
   log.gripper->opening_command_time.reset();
   EXPECT_THAT(unit_doubts(log), IsEmpty());
   for (auto& one : log.throws) scale(one.mocap->pose, kDegree, 2, 3);
@@ -230,7 +226,7 @@ TEST(UnitCheck, WithoutAnOpeningCommandTheForceTellsWhenItOpens) {
 }
 
 TEST(UnitCheck, AWrenchThatSaysNothingIsNoUnit) {
-  auto log = campaign();
+  auto log = small_log();
   for (auto& one : log.throws) scale(one.ft->wrench, 0, 0, 3);
   EXPECT_THAT(unit_doubts(log), IsEmpty());
 }
@@ -261,7 +257,7 @@ TEST(UnitCheck, TheDataFolderRaisesNoDoubt) {
 }
 
 TEST(UnitCheck, WhatASensorMayHaveRaisesNoDoubt) {
-  auto log = campaign();
+  auto log = small_log();
   for (auto& one : log.throws) {
     scale(one.ft->wrench, 1.5, 0, 3);   // another gain
     scale(one.mocap->pose, 1.2, 0, 2);  // another length of the wand
@@ -306,7 +302,7 @@ TEST(UnitCheck, OneThrowInAnotherUnitIsToldByItsOwnPath) {
 }
 
 TEST(UnitCheck, OneGraspAngleInDegreesIsToldOfItsThrow) {
-  auto log = campaign();
+  auto log = small_log();
   log.throws[3].grasp_angle = -22;
   const auto doubts = unit_doubts(log);
   ASSERT_EQ(doubts.size(), 1U);
@@ -314,7 +310,7 @@ TEST(UnitCheck, OneGraspAngleInDegreesIsToldOfItsThrow) {
 }
 
 TEST(UnitCheck, AWildThrowIsNotInAnotherUnit) {
-  auto log = campaign();
+  auto log = small_log();
   auto& wild = log.throws[3];
   scale(wild.ft->wrench, 3, 0, 3);
   scale(wild.ft->normal_force, 0.3);
@@ -326,14 +322,14 @@ TEST(UnitCheck, AWildThrowIsNotInAnotherUnit) {
 
 TEST(UnitCheck, AFrameElsewhereIsInNoUnitAndNoTurnOff) {
   for (const double by : {4.0, 2 * std::numbers::pi}) {  // rad
-    auto log = campaign();
+    auto log = small_log();
     log.throws[2].mocap->pose(20, 2) += by;
     EXPECT_THAT(unit_doubts(log), IsEmpty()) << by;
   }
 }
 
 TEST(UnitCheck, ARecordingMayBeginLongBeforeTheThrow) {
-  auto log = campaign();
+  auto log = small_log();
   for (auto& one : log.throws) {
     auto& mocap = *one.mocap;
     constexpr std::size_t kBefore = 30000;  // frames
@@ -356,7 +352,7 @@ TEST(UnitCheck, ARecordingMayBeginLongBeforeTheThrow) {
 
 // One that tumbles while its repetitions hardly turn, as motion capture sees it do.
 TEST(UnitCheck, AThrowThatTurnsAsNoOtherDoesIsNotInDegrees) {
-  auto log = campaign();
+  auto log = small_log();
   for (auto& one : log.throws) {
     one.condition = "alike";
     const bool tumbles = one.id == log.throws[3].id;
@@ -370,7 +366,7 @@ TEST(UnitCheck, AThrowThatTurnsAsNoOtherDoesIsNotInDegrees) {
 }
 
 TEST(UnitCheck, AGraspAngleMayBeWholeTurnsFromTheOthers) {
-  auto log = campaign();
+  auto log = small_log();
   for (auto& one : log.throws) one.mocap.reset(), one.grasp_angle = -0.2;
   for (const std::size_t k : {2u, 5u}) {
     const double turns = 2 * std::numbers::pi * (k == 2 ? -1 : 2);
@@ -505,7 +501,7 @@ TEST(UnitCheck, GravityMeasuresAnAccelerometerAtRest) {
 
 TEST(UnitCheck, ALandingHeightWhereNothingLandsIsRefused) {
   for (const double height : {50.0, 800.0, -50.0, -800.0}) {
-    auto log = campaign();
+    auto log = small_log();
     log.landing_height = height;
     for (const bool timed : {true, false}) {
       if (!timed)
@@ -518,7 +514,7 @@ TEST(UnitCheck, ALandingHeightWhereNothingLandsIsRefused) {
 }
 
 TEST(UnitCheck, AnotherGravityIsSuspectedBesideTheLandingHeight) {
-  auto log = campaign();
+  auto log = small_log();
   log.gravity = 1.62;
   ASSERT_EQ(unit_doubts(log).size(), 1u);
   EXPECT_THAT(unit_doubts(log).front().reason, HasSubstr("another gravity than the declared 1.62 m/s^2?"));
@@ -532,7 +528,7 @@ UnitDoubt only_doubt(const ThrowLog& log) {
 
 TEST(UnitCheck, NoBodyOfItsMassAndSizeHasSuchAnInertia) {
   for (const double factor : {1e4, 1e-4}) {
-    auto log = campaign();
+    auto log = small_log();
     auto& [name, object] = *log.objects.begin();
     object.inertia->front() *= factor;
     const auto told = only_doubt(log);
@@ -540,7 +536,7 @@ TEST(UnitCheck, NoBodyOfItsMassAndSizeHasSuchAnInertia) {
     EXPECT_THAT(told.reason, HasSubstr("radius of gyration"));
   }
   // All mass in two opposite corners of the box is the most that there is.
-  auto log = campaign();
+  auto log = small_log();
   auto& object = log.objects.begin()->second;
   object.dims = {0.3, 0.02, 0.04};
   const double most = object.mass * (0.09 + 4e-4 + 1.6e-3) / 4;
@@ -560,7 +556,7 @@ TEST(UnitCheck, ARodOfOsmiumHasTheLeastInertia) {
 }
 
 TEST(UnitCheck, ALeverInMillimetresShowsOnEitherSideOfThePads) {
-  auto log = campaign();
+  auto log = small_log();
   for (auto& [name, object] : log.objects) *object.com_offset *= -1000;  // and the x axis points backwards
   for (auto& one : log.throws) {
     for (std::size_t i = 0; i < one.mocap->pose.rows; ++i) one.mocap->pose(i, 2) += std::numbers::pi;
@@ -571,11 +567,11 @@ TEST(UnitCheck, ALeverInMillimetresShowsOnEitherSideOfThePads) {
 
 TEST(UnitCheck, NoPadIsLargerThanWhatItHolds) {
   for (const double factor : {1000.0, 100.0, 39.4}) {  // mm, cm, inch
-    auto log = campaign();
+    auto log = small_log();
     log.gripper->pad_radius = factor * 0.0106;
     EXPECT_EQ(only_doubt(log).path, "/gripper@pad_radius") << factor;
   }
-  auto log = campaign();
+  auto log = small_log();
   for (auto& [name, object] : log.objects) object.dims = {0.3, 0.02, 0.04};
   log.gripper->pad_radius = 0.19;
   for (const auto& doubt : unit_doubts(log)) EXPECT_NE(doubt.path, "/gripper@pad_radius");
@@ -585,7 +581,7 @@ TEST(UnitCheck, NoPadIsLargerThanWhatItHolds) {
 
 TEST(UnitCheck, ALeverAlongAnotherAxisIsSeenByMotionCapture) {
   const auto turned = [](double by) {
-    auto log = campaign();
+    auto log = small_log();
     for (auto& one : log.throws) {
       for (std::size_t i = 0; i < one.mocap->pose.rows; ++i) one.mocap->pose(i, 2) += by;
       one.landing->pose(0, 1) += by;
@@ -602,7 +598,7 @@ TEST(UnitCheck, ALeverAlongAnotherAxisIsSeenByMotionCapture) {
 
 // Motion capture and landings count from another instant than the robot: the height is not to blame.
 TEST(UnitCheck, LandingsTimedByAnotherClockDoNotDoubtTheLandingHeight) {
-  auto log = campaign();
+  auto log = small_log();
   for (auto& one : log.throws) {
     for (std::size_t i = 0; i < one.mocap->time.rows; ++i) one.mocap->time(i) += 5;
     one.landing->time(0) += 5;
@@ -614,7 +610,7 @@ TEST(UnitCheck, LandingsTimedByAnotherClockDoNotDoubtTheLandingHeight) {
 
 TEST(UnitCheck, FlightsContradictAWrongLandingHeight) {
   for (const double height : {0.3, -0.3}) {
-    auto log = campaign();
+    auto log = small_log();
     log.landing_height = height;
     const auto told = only_doubt(log);
     EXPECT_EQ(told.path, "/@landing_height");
@@ -622,7 +618,7 @@ TEST(UnitCheck, FlightsContradictAWrongLandingHeight) {
     const std::string said = "land at ";
     ASSERT_THAT(told.reason, HasSubstr(said));
     EXPECT_NEAR(std::stod(told.reason.substr(told.reason.find(said) + said.size())),
-                campaign().landing_height, 0.004);
+                small_log().landing_height, 0.004);
     for (auto& one : log.throws) one.mocap.reset();  // then nothing does
     EXPECT_THAT(unit_doubts(log), IsEmpty());
   }

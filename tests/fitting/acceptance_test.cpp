@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <vector>
 
 #include "fitting/discovery/misfit_rules.hpp"
 #include "tests/fitting/loop_campaign.hpp"

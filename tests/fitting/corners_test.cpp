@@ -5,7 +5,6 @@
 
 #include <cmath>
 #include <functional>
-#include <stdexcept>
 
 #include "fitting/discovery/discover.hpp"
 #include "tests/fitting/loop_campaign.hpp"

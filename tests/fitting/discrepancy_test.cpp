@@ -98,11 +98,7 @@ class DiscrepancyOfOneUnknown : public testing::Test {
     return out;
   }
   static bool any(const experiment::Observation&, Phase) { return true; }
-  static bool is_camera(const experiment::Observation& o) {
-    using experiment::Channel;
-    return o.channel == Channel::mocap_x || o.channel == Channel::mocap_z ||
-           o.channel == Channel::mocap_theta;
-  }
+  static bool is_camera(const experiment::Observation& o) { return is_tracked(o.channel); }
 
   /// The variance by which the conditions disagree beyond the noise, beside what is known `before`.
   double of_conditions(const Witness& before = {}) const {

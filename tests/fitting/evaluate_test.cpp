@@ -21,15 +21,10 @@ namespace unhand::fitting {
 namespace {
 
 using testing::HasSubstr;
-
-const datasets::ThrowLog& log_of_disc() {
-  static const auto log =
-      experiment::generate_campaign(testing_support::small_design("limit_surface_disc"), 5);
-  return log;
-}
+using testing_support::small_log;
 
 const CampaignProblem& disc() {
-  static const CampaignProblem problem(log_of_disc(), "(in memory)", CampaignOptions{});
+  static const CampaignProblem problem(small_log(), "(in memory)", CampaignOptions{});
   return problem;
 }
 
@@ -141,16 +136,16 @@ TEST(Evaluate, TwistErrorsOfTheBaseModelAreThoseOfCompare) {
 }
 
 TEST(Evaluate, CrossValidationLeavesConditionsOut) {
-  const auto cv = cross_validate(log_of_disc(), "(in memory)", {}, {}, 2);
+  const auto cv = cross_validate(small_log(), "(in memory)", {}, {}, 2);
   EXPECT_EQ(cv.folds, 2);
   EXPECT_TRUE(cv.failed.empty());
   std::size_t train = 0;
-  for (const auto& one : log_of_disc().throws) train += one.split == datasets::Split::train;
+  for (const auto& one : small_log().throws) train += one.split == datasets::Split::train;
   EXPECT_EQ(cv.throws.size(), train);
   for (const auto& one : cv.throws)
     EXPECT_EQ(one.comparison.split, datasets::Split::test) << one.comparison.id;
   EXPECT_LT(cv.statistics(2).mae, 0.01);
-  auto single = log_of_disc();
+  auto single = small_log();
   for (auto& one : single.throws) one.condition = "same";
   EXPECT_EQ(cross_validate(single, "(in memory)", {}, {}, 2).folds, 2) << "of two objects: two experiments";
   std::erase_if(single.throws, [&](const auto& one) { return one.object != single.throws.front().object; });
@@ -191,7 +186,7 @@ TEST(Evaluate, SigmaCountsWhatAnotherValueMakesOfTheGrasp) {
 // Before the detach the object moves with the hand: what the tracker shows there is no part of the twist that
 // it leaves with, also where a model is sure that it had left already.
 TEST(Evaluate, TwistErrorsAreOfTheFlightAlone) {
-  auto log = log_of_disc();
+  auto log = small_log();
   for (std::size_t k = 0; k < log.throws.size(); ++k) {
     const CampaignThrow& thrown = disc().throws()[k];
     auto& mocap = *log.throws[k].mocap;
@@ -201,7 +196,7 @@ TEST(Evaluate, TwistErrorsAreOfTheFlightAlone) {
   }
   CampaignOptions options;
   options.model = "gripper_delay";
-  const CampaignProblem bent(log, "(in memory)", options), seen(log_of_disc(), "(in memory)", options);
+  const CampaignProblem bent(log, "(in memory)", options), seen(small_log(), "(in memory)", options);
   FitResult early;
   early.outcome = FitOutcome::converged;
   early.campaign.push_back({seen.campaign()[0], 0.03, 0, 0, false});
@@ -253,8 +248,8 @@ TEST(Evaluate, ComparisonsCountWhatDidNotLandAndTheMeanTime) {
 // Where a condition is left out, so are all of its repetitions: what its landings say is not known to the fit
 // that predicts them.
 TEST(Evaluate, AConditionThatIsLeftOutSaysNothing) {
-  const auto conditions = datasets::conditions_of(log_of_disc(), datasets::Split::train);
-  auto other = log_of_disc();
+  const auto conditions = datasets::conditions_of(small_log(), datasets::Split::train);
+  auto other = small_log();
   const auto is_of_it = [&](const auto& one) {
     return one.object == conditions.front().first && one.condition == conditions.front().second;
   };
@@ -263,7 +258,7 @@ TEST(Evaluate, AConditionThatIsLeftOutSaysNothing) {
   const int all = static_cast<int>(conditions.size());
   FitOptions quickly;
   quickly.rounds = 2;
-  const auto a = cross_validate(log_of_disc(), "(in memory)", {}, quickly, all + 3),
+  const auto a = cross_validate(small_log(), "(in memory)", {}, quickly, all + 3),
              b = cross_validate(other, "(in memory)", {}, quickly, all + 3);
   EXPECT_EQ(a.folds, all) << "no more than there are conditions";
   EXPECT_TRUE(a.failed.empty());
@@ -297,7 +292,7 @@ TEST(Card, RoundTripIsExact) {
   const auto back = datasets::parse_model_card(datasets::to_json(card));
   EXPECT_EQ(back, card);
 
-  const CampaignProblem problem(log_of_disc(), "(in memory)", options_of(back, "card.json"));
+  const CampaignProblem problem(small_log(), "(in memory)", options_of(back, "card.json"));
   const auto again = fit_of(back, problem, "card.json");
   EXPECT_EQ(again.values(), fit_of_disc().values());
   EXPECT_EQ(again.covariance, fit_of_disc().covariance);
@@ -337,7 +332,7 @@ TEST(Card, HoldsEffectsAndRefusesUnknownOnes) {
   card.library_version = "0.1.0";
   const auto options = options_of(card, "card.json");
   EXPECT_THAT(options.effects, testing::ElementsAre("sensor.length_scale"));
-  const CampaignProblem again(log_of_disc(), "(in memory)", options);
+  const CampaignProblem again(small_log(), "(in memory)", options);
   EXPECT_EQ(fit_of(card, again, "card.json").values(), made.values());
 
   const auto refusal = [](const datasets::ModelCard& bad) {
@@ -514,7 +509,7 @@ TEST(Card, ChecksumIsTheDocumentedOne) {
 }
 
 TEST(Advice, NamesWhatWouldFixIt) {
-  auto log = log_of_disc();
+  auto log = small_log();
   for (auto& one : log.throws) {
     one.ft.reset();
     one.detach_time = 0.1;

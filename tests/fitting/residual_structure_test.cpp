@@ -11,7 +11,6 @@
 #include <string>
 #include <vector>
 
-#include "experiment/campaign_effects.hpp"
 #include "experiment/random_stream.hpp"
 #include "experiment/throw_setup.hpp"
 #include "fitting/discovery/jackknife.hpp"

@@ -613,8 +613,7 @@ TEST(SkuValidation, WhatIsAssumedIsAsWideAsItIsSaid) {
   ASSERT_NE(input_of(inputs, "surface"), nullptr);
   EXPECT_NEAR(input_of(inputs, "surface")->sigma, 0.3 * 0.5, 1e-15) << "a share of mu";
   // A force that was measured is no assumption.
-  const auto log = experiment::generate_campaign(testing_support::small_design("limit_surface_disc"), 5);
-  const CampaignProblem measured(log, "(in memory)", {});
+  const CampaignProblem measured(testing_support::small_log(), "(in memory)", {});
   EXPECT_EQ(input_of(throw_inputs(sku, gripper, "card.json", measured.throws().front().prepared, assumed),
                      "grip_force"),
             nullptr);

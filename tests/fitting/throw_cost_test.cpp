@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <vector>
 
 #include "tests/support/small_campaign.hpp"
@@ -25,8 +24,7 @@ TEST(ThrowCost, AnUnknownIsHeldAtABoundThatItsCostFallsBeyond) {
 
 // Without any throw the prior alone speaks, which leads inward from both ends of a range.
 TEST(ThrowCost, APriorIsAMeasurementOfItsMean) {
-  const auto log = experiment::generate_campaign(testing_support::small_design("limit_surface_disc"), 5);
-  const CampaignProblem problem(log, "(in memory)", {});
+  const CampaignProblem problem(testing_support::small_log(), "(in memory)", {});
   const FitOptions options;
   const std::size_t n = problem.campaign().size();
   Shared shared{problem, options, std::vector<double>(n, 0.1), {}, {}, {}};

@@ -4,14 +4,10 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdint>
-#include <functional>
 #include <random>
 #include <stdexcept>
-#include <vector>
 
 #include "tests/support/best_difference.hpp"
 

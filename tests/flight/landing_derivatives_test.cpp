@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cmath>
-#include <functional>
 
 #include "flight/fly.hpp"
 #include "tests/flight/tight.hpp"

@@ -16,8 +16,6 @@
 namespace unhand::flight {
 namespace {
 
-using dynamics::Dual;
-
 using OpenAir = SpatialAir<double>;
 using LetGo = SpatialStart<double>;
 using Flown = SpatialState<double>;

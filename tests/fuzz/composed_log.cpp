@@ -1,6 +1,5 @@
 #include "tests/fuzz/composed_log.hpp"
 
-#include <algorithm>
 #include <optional>
 #include <stdexcept>
 

@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
-#include <numbers>
 #include <stdexcept>
 
 #include "datasets/log_error.hpp"

@@ -6,7 +6,6 @@
 
 #include <cmath>
 #include <map>
-#include <numbers>
 
 #include "planners/arm/panda.hpp"
 #include "planners/tube/held_motion.hpp"

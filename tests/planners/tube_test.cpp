@@ -9,7 +9,6 @@
 #include <random>
 #include <tuple>
 
-#include "planners/arm/dynamics.hpp"
 #include "planners/arm/panda.hpp"
 #include "planners/tube/plan_throw.hpp"
 #include "planners/tube/planar_joints.hpp"

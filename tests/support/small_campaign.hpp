@@ -16,6 +16,12 @@ inline experiment::CampaignDesign small_design(const std::string& model) {
   return design;
 }
 
+/// One of them, whose pads obey the disc.
+inline const datasets::ThrowLog& small_log() {
+  static const auto log = experiment::generate_campaign(small_design("limit_surface_disc"), 5);
+  return log;
+}
+
 /// What a fit of the design's model should find: the campaign's mean of that unknown.
 inline double truth_of(const experiment::CampaignDesign& design, const std::string& unknown) {
   if (unknown == "mu") return design.patch.mu;

@@ -2,8 +2,6 @@
 // lever is the patch's length, so that τ_p/τ_max = f_p/f_max = m g/f_max throughout.
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "contact/sliding_pivot.hpp"
 #include "tests/support/simple_scenes.hpp"
 

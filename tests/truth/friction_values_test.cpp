@@ -2,7 +2,6 @@
 // patches.
 #include <gtest/gtest.h>
 
-#include <array>
 #include <cmath>
 #include <stdexcept>
 
