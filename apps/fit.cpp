@@ -17,6 +17,7 @@
 #include "apps/throws.hpp"
 #include "apps/weak_grip.hpp"
 #include "datasets/near_miss.hpp"
+#include "datasets/summary.hpp"
 
 namespace unhand::apps {
 namespace {
@@ -103,6 +104,9 @@ void fit_throws(const FitRequest& request, const datasets::ThrowLog& log) {
   progress.step();
   const auto cost = fitting::gradient_cost(problem, fit);
   FitAnswer answer{problem, fit, {}, {}, {}, {}, cost, 1, {}};
+  for (const auto& noise : datasets::summarise(log).noise)
+    if (const auto columns = noise.understated(); !columns.empty())
+      answer.understated.push_back(noise.dataset + " scatters by more than it declares, " + columns);
   answer.origin = origin_text(log);
   answer.threads = request.threads > 0 ? request.threads
                                        : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));

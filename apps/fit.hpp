@@ -32,8 +32,9 @@ struct FitAnswer {
   std::optional<fitting::CrossValidation> cross_validation;
   std::optional<fitting::ErrorFloor> floor;
   fitting::GradientCost gradients;
-  int threads{1};      ///< used
-  std::string origin;  ///< of the log, as it declares it
+  int threads{1};                          ///< used
+  std::string origin;                      ///< of the log, as it declares it
+  std::vector<std::string> understated{};  ///< columns whose declared noise is too small, in words
 
   /// Of the fit's time, over all threads.
   double jacobian_share() const {

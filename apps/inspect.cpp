@@ -83,25 +83,11 @@ Table datasets_of(const datasets::LogSummary& summary) {
   return table;
 }
 
-/// The names of the columns "x,z,theta"; empty where they are not as many.
-std::vector<std::string> names_of(const std::string& columns, std::size_t count) {
-  std::vector<std::string> out;
-  std::istringstream list(columns);
-  for (std::string name; std::getline(list, name, ',');) out.push_back(name);
-  return out.size() == count ? out : std::vector<std::string>{};
-}
-
 /// What the samples say against the declared noise, a line each.
 std::string noise_doubts(const datasets::LogSummary& summary) {
   std::string out;
   for (const auto& noise : summary.noise) {
-    const auto names = names_of(noise.columns, noise.ratio.size());
-    std::string columns;
-    for (std::size_t j = 0; j < noise.too_small.size(); ++j)
-      if (noise.too_small[j])
-        columns += fmt::format("{}{} {:.2g} times", columns.empty() ? "" : ", ",
-                               names.empty() ? fmt::format("column {}", j) : names[j], noise.ratio[j]);
-    if (!columns.empty())
+    if (const std::string columns = noise.understated(); !columns.empty())
       out += fmt::format(
           "declared too small: {}: its samples scatter from one to the next by more than the declared "
           "sigma ({})\n",

@@ -149,13 +149,13 @@ std::vector<double> weights(const ForceSeries& s, const Ramp& ramp, const std::v
   return out;
 }
 
-// Running medians of five, at the ends of three.
-std::vector<double> calmed(std::span<const double> x) {
+// Running medians of 2 `side` + 1, at the ends of fewer.
+std::vector<double> calmed(std::span<const double> x, std::size_t side = 2) {
   std::vector<double> out;
   for (std::size_t k = 0; k < x.size(); ++k) {
-    const std::size_t first = k < 2 ? 0 : k - 2, last = std::min(x.size(), k + 3);
+    const std::size_t first = k < side ? 0 : k - side, last = std::min(x.size(), k + side + 1);
     const std::size_t count = last - first - (last - first + 1) % 2;  // odd
-    out.push_back(dynamics::median(x.subspan(k < 2 ? 0 : last - count, count)));
+    out.push_back(dynamics::median(x.subspan(k < side ? 0 : last - count, count)));
   }
   return out;
 }
@@ -302,7 +302,7 @@ double above_tail(const ForceSeries& s, double tail, double peak) {
 std::size_t later_rise(const ForceSeries& measured, double tail, double peak) {
   constexpr double kLower = 0.25;    // of the peak
   constexpr std::size_t kLevel = 3;  // samples
-  const std::vector<double> calm = calmed(measured.value);
+  const std::vector<double> calm = calmed(measured.value, 1);
   const double above = above_tail(measured, tail, peak), high = tail + kLower * (peak - tail);
   std::size_t last = calm.size();  // the last sample of what is higher
   while (last > 0 && calm[last - 1] < high) --last;

@@ -81,7 +81,7 @@ double above_tail(const ForceSeries&, double tail, double peak);
 
 /// Where the series rises once more, by less than a quarter of `peak`, after it has been at `tail` for three
 /// samples or more: the first sample of the first such rise after the last descent from higher up. The number
-/// of samples where there is none. Sought as last_descent is.
+/// of samples where there is none. Sought in running medians of three.
 std::size_t later_rise(const ForceSeries&, double tail, double peak);
 
 /// The opening as measured: start, release and shape of its ramp, and which of its parts are what the model

@@ -1,5 +1,7 @@
 #include "datasets/summary.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -237,6 +239,16 @@ LogSummary summarise(const ThrowLog& log) {
     if (channel.kind != ChannelKind::time && !channel.single) add_scatter(noise, channel, throws);
     if (noise.throws > 0) out.noise.push_back(std::move(noise));
   }
+  return out;
+}
+
+std::string NoiseSummary::understated() const {
+  const auto names = parts_of(columns);
+  std::string out;
+  for (std::size_t j = 0; j < too_small.size(); ++j)
+    if (too_small[j])
+      out += fmt::format("{}{} {:.2g} times", out.empty() ? "" : ", ",
+                         names.size() == ratio.size() ? names[j] : fmt::format("column {}", j), ratio[j]);
   return out;
 }
 

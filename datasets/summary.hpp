@@ -55,6 +55,8 @@ struct NoiseSummary {
   std::vector<double> ratio;            ///< of the scatter to the declared noise; 0 where there is no either
   std::vector<bool> too_small;  ///< a ratio above kMore, above 1 by three of its standard errors, where
                                 ///< noise, not motion, is most of the doubled differences
+  /// The columns whose declared noise is too small: "fx 3.3 times, tau 2 times"; empty where there are none.
+  std::string understated() const;
 };
 
 /// What `unhand inspect` says of a log.

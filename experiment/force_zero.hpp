@@ -25,6 +25,7 @@ struct UntaredForce {
 /// How the pads open in each throw, by its normal force; none where that does not tell when they part, or
 /// where nothing says that they let go (no landing, no declared flight: they may still press).
 using ForceOpenings = std::vector<std::optional<contact::NormalForceSummary>>;
+/// Those of a log, whose forces are smoothed for it.
 ForceOpenings force_openings(const datasets::ThrowLog& log);
 /// The same of throws whose force has been smoothed.
 ForceOpenings force_openings(const std::vector<PreparedThrow>& throws);

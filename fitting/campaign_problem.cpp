@@ -94,6 +94,16 @@ CampaignProblem::CampaignProblem(const datasets::ThrowLog& logged, const std::st
             options.integrator};
   for (const auto& note : experiment::force_notes(log, experiment::force_openings(prepared)))
     notes_.push_back(note.in_words(prepared.size()));
+  if (const auto n = std::count_if(
+          prepared.begin(), prepared.end(),
+          [](const auto& p) { return p.hand_fit.twist_differenced || p.hand_fit.acceleration_differenced; });
+      n > 0)
+    notes_.push_back(fmt::format(
+        "hand/twist or hand/acceleration are difference quotients of the series before them in {} of {} "
+        "throws: they "
+        "tell nothing of their own and are not used; how the hand accelerates is known better from a robot's "
+        "controller",
+        n, prepared.size()));
   if (!options.predict_only) guess_start(log, prepared, !grips.empty());
   if (const auto scatter = grasp_scatter_across(log, prepared); scatter.is_evident()) {
     scatters_across_ = true;

@@ -26,6 +26,34 @@ Columns sigma_to_use(std::span<const double> rows, const Columns& declared) {
   return out;
 }
 
+// Whether `derived` is a difference quotient of `values` in all three columns, and has noise: of a smooth
+// motion every derivative is its difference quotient.
+bool is_differenced(std::span<const double> time, std::span<const double> values,
+                    std::span<const double> derived) {
+  constexpr double kSame = 1e-6, kNoisy = 1e-4;  // of the largest
+  constexpr double kMost = 0.9;  // of the samples: ends, and what was clipped, may be otherwise
+  const std::size_t n = time.size();
+  if (n < 8) return false;
+  for (std::size_t c = 0; c < 3; ++c) {
+    double largest = 0;
+    for (std::size_t i = 0; i < n; ++i) largest = std::max(largest, std::abs(derived[3 * i + c]));
+    if (!(dynamics::white_noise(derived, c, 3) > kNoisy * largest)) return false;
+    std::array<std::size_t, 3> same{};  // central, backward, forward
+    for (std::size_t i = 1; i + 1 < n; ++i) {
+      const double before = time[i] - time[i - 1], after = time[i + 1] - time[i];
+      const double backward = (values[3 * i + c] - values[3 * (i - 1) + c]) / before,
+                   forward = (values[3 * (i + 1) + c] - values[3 * i + c]) / after;
+      const double central = (after * backward + before * forward) / (before + after);
+      const double candidates[] = {central, backward, forward};
+      for (std::size_t k = 0; k < 3; ++k)
+        if (std::abs(derived[3 * i + c] - candidates[k]) <= kSame * largest) ++same[k];
+    }
+    if (static_cast<double>(*std::max_element(same.begin(), same.end())) < kMost * static_cast<double>(n - 2))
+      return false;
+  }
+  return true;
+}
+
 // Samples on each side of a jump: of strong ones, and of weak but noisy ones.
 constexpr std::array<std::size_t, 3> kReaches = {6, 14, 32};
 constexpr double kSignificant = 8.0;  // a jump, in σ of its own estimate
@@ -347,14 +375,18 @@ HandFit fit_hand_motion(const HandSeries& s, std::span<const double> declared) {
   problem.begin = s.time.front();
   problem.end = s.time.back();
   for (double t : jumps) problem.breaks.push_back({t, 1});
-  problem.observations = {
-      {0, s.time, s.pose, sigma_x}, {1, s.time, s.twist, sigma_v}, {2, s.time, s.acceleration, sigma_a}};
+  HandFitSummary summary;
+  summary.twist_differenced = is_differenced(s.time, s.pose, s.twist);
+  summary.acceleration_differenced = is_differenced(s.time, s.twist, s.acceleration);
+  problem.observations = {{0, s.time, s.pose, sigma_x}};
+  if (!summary.twist_differenced) problem.observations.push_back({1, s.time, s.twist, sigma_v});
+  if (!summary.acceleration_differenced) problem.observations.push_back({2, s.time, s.acceleration, sigma_a});
   auto fit = dynamics::fit_spline(problem);
 
-  HandFitSummary summary;
-  summary.pose_chi2 = fit.summary.chi2[0];
-  summary.twist_chi2 = fit.summary.chi2[1];
-  summary.acceleration_chi2 = fit.summary.chi2[2];
+  auto chi2 = fit.summary.chi2.begin();
+  summary.pose_chi2 = *chi2++;
+  if (!summary.twist_differenced) summary.twist_chi2 = *chi2++;
+  if (!summary.acceleration_differenced) summary.acceleration_chi2 = *chi2++;
   summary.pose_sigma = sigma_x;
   summary.twist_sigma = sigma_v;
   summary.acceleration_sigma = sigma_a;

@@ -107,6 +107,9 @@ struct HandFitSummary {
   std::array<double, 3> pose_chi2{}, twist_chi2{}, acceleration_chi2{};     ///< columns x, z, θ [-]
   std::array<double, 3> pose_sigma{}, twist_sigma{}, acceleration_sigma{};  ///< the σ used
   double chi2_per_dof{};                                                    ///< of everything together
+  /// Whether the twist is the difference quotient of the pose, the acceleration that of the twist: then it
+  /// tells nothing of its own, and took no part (its chi2 is 0).
+  bool twist_differenced{}, acceleration_differenced{};
   bool noise_reached{};  ///< no stretch has a misfit beyond doubt (4.5 standard deviations)
 };
 
@@ -122,6 +125,10 @@ struct HandFit {
 /// σ_a over a stretch of length τ the acceleration comes from the acceleration series while σ_a < σ_v/τ and
 /// σ_a < σ_x/τ², and so on: in a throw (τ of some tens of milliseconds) usually pose from pose, acceleration
 /// from acceleration, and the twist from both its neighbours.
+///
+/// A noisy series that is the difference quotient of the one before it (central, forward or backward, to a
+/// millionth) is left out: it has that one's noise again, which three series that agree would pass for
+/// motion.
 ///
 /// A σ that is not declared is estimated from the series' own high-frequency scatter; where a column shows
 /// none (an analytic log), it is 1e-6 m, m/s, m/s² (or rad).

@@ -95,6 +95,31 @@ TEST_F(Cli, FitSaysThatAWildReadingIsOfOneThrow) {
   EXPECT_THAT(answer.err, Not(HasSubstr("Another unit")));
 }
 
+// A held-out landing that was written down wrongly bends no fit, but the errors that the card tells.
+TEST_F(Cli, FitNamesHeldOutThrowsThatErrAsNoOther) {
+  std::string id;
+  write_changed("wild.h5", [&id](datasets::Throw& one) {
+    if (!id.empty() || one.split == datasets::Split::train) return;
+    id = one.id, one.landing->pose(0, 0) += 0.5;
+  });
+  const Answer answer = run("fit wild.h5 --model limit_surface_disc");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  EXPECT_THAT(answer.err, HasSubstr("landing x [m] errs as in no other throw in " + id + ", held out (-0.5"));
+  EXPECT_THAT(run("fit " + quick + " --model limit_surface_disc").err, Not(HasSubstr("errs as in no other")));
+}
+
+// What is declared too small is told where it shows.
+TEST_F(Cli, FitSaysThatNoiseIsDeclaredTooSmall) {
+  write_changed("sure.h5", [](datasets::Throw& one) {
+    for (double& sigma : one.mocap->pose.sigma) sigma *= 0.3;
+  });
+  EXPECT_THAT(
+      run("fit sure.h5 --model limit_surface_disc").err,
+      HasSubstr(
+          "noise is declared too small, which chi2 takes for misfit: mocap/pose scatters by more than it "
+          "declares, x 3."));
+}
+
 TEST_F(Cli, FitThenPredict) {
   const Answer answer =
       run("fit " + quick + " --model limit_surface_disc --card c.json --json f.json --report r");

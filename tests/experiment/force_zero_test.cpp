@@ -1,8 +1,12 @@
 // A normal force that does not end at zero is told.
 #include "experiment/force_zero.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <functional>
 #include <random>
 
 #include "tests/support/small_campaign.hpp"
@@ -61,6 +65,53 @@ TEST(ForceZero, PadsThatMayStillPressAreNoDoubt) {
   auto log = offset_log(1);
   for (auto& one : log.throws) one.landing.reset(), one.free_flight.reset();
   EXPECT_FALSE(untared_force(force_openings(log)));
+}
+
+/// Notes of a log whose normal forces were changed sample by sample: (t − release [s], f [N]) -> f.
+std::vector<LogNote> notes_of(const std::function<double(double, double)>& change) {
+  auto log = testing_support::small_log();
+  const auto openings = force_openings(log);
+  for (std::size_t i = 0; i < log.throws.size(); ++i) {
+    auto& ft = *log.throws[i].ft;
+    for (std::size_t k = 0; k < ft.time.rows; ++k)
+      ft.normal_force.data[k] = change(ft.time(k) - openings[i]->release_time, ft.normal_force(k));
+  }
+  return force_notes(log, force_openings(log));
+}
+
+TEST(ForceNotes, AGoodSensorHasNone) {
+  EXPECT_TRUE(notes_of([](double, double f) { return f; }).empty());
+  EXPECT_TRUE(notes_of([](double, double f) { return std::round(f / 0.1) * 0.1; }).empty());  // on a grid
+}
+
+TEST(ForceNotes, PadsThatTouchOnceMoreAreTold) {
+  const auto notes = notes_of([](double t, double f) {
+    const double s = (t - 0.012) / 0.006;
+    return f + (s > 0 && s < 1 ? 3 * std::sin(M_PI * s) : 0.0);
+  });
+  ASSERT_EQ(notes.size(), 1U);
+  EXPECT_THAT(notes[0].said, testing::HasSubstr("rises again by 3.0"));
+  EXPECT_EQ(notes[0].throws, 12);
+}
+
+TEST(ForceNotes, ASensorAtTheEndOfItsRangeIsTold) {
+  const auto notes = notes_of([](double, double f) { return std::min(f, 40.0); });
+  ASSERT_EQ(notes.size(), 1U);
+  EXPECT_THAT(notes[0].said, testing::HasSubstr("stands at 40 N"));
+  EXPECT_EQ(notes[0].throws, 12);
+}
+
+TEST(ForceNotes, AFilterAndHumAreTold) {
+  double before = 0;
+  const auto filtered = notes_of([&before](double t, double f) {
+    if (t < -0.11) before = f;
+    return before += (1 - std::exp(-1.0 / 3)) * (f - before);  // 3 ms, at 1 kHz
+  });
+  ASSERT_EQ(filtered.size(), 1U);
+  EXPECT_THAT(filtered[0].said, testing::HasSubstr("low-pass filter"));
+  const auto humming = notes_of([](double t, double f) { return f + 0.25 * std::sin(2 * M_PI * 50 * t); });
+  ASSERT_EQ(humming.size(), 1U);
+  EXPECT_THAT(humming[0].said, testing::HasSubstr("hum of some 50 Hz"));
 }
 
 }  // namespace

@@ -77,14 +77,14 @@ TEST(UnitCheck, TellsOfAnglesThatAreWholeTurnsOff) {
     EXPECT_THAT(told.reason, HasSubstr("a jump of"));
   }
 
-  log = campaign();
+  log = small_log();
   log.throws[3].landing->pose(0, 1) += 0.53 * kTurn;
   EXPECT_THAT(doubt_of(log).reason, AllOf(HasSubstr("no whole turn"), Not(HasSubstr("unwrapped"))));
 }
 
 // Stamps of frames that come in bursts: between two the angle changes by its noise, within next to no time.
 TEST(UnitCheck, UnevenStampsAreNoTurns) {
-  auto log = campaign();
+  auto log = small_log();
   for (auto& one : log.throws)
     for (std::size_t i = 1; i < one.mocap->time.rows; i += 2)
       one.mocap->time.data[i] = one.mocap->time(i - 1) + 1e-6;

@@ -222,6 +222,47 @@ TEST(FitHandMotion, ReportsSeriesThatContradictEachOther) {
   EXPECT_GT(worst, 3.0);
 }
 
+// Encoders alone: twist and acceleration are difference quotients of the pose, and agree with its noise.
+TEST(FitHandMotion, WhatWasDifferencedIsNoMeasurementOfItsOwn) {
+  const Swing swing{.t_jump = 10};
+  std::mt19937_64 random(12);
+  for (const double noise : {1e-6, 2e-5}) {
+    Log log = record(swing, 0, 200, {noise, 0, 0}, &random);
+    const auto differenced = [&](const std::vector<double>& of) {  // central; at the ends to one side
+      std::vector<double> out(of.size());
+      const std::size_t n = log.time.size();
+      for (std::size_t i = 0; i < n; ++i)
+        for (std::size_t c = 0; c < 3; ++c) {
+          const std::size_t a = i == 0 ? 0 : i - 1, b = std::min(i + 1, n - 1);
+          out[3 * i + c] = (of[3 * b + c] - of[3 * a + c]) / (log.time[b] - log.time[a]);
+        }
+      return out;
+    };
+    log.twist = differenced(log.pose);
+    log.acceleration = differenced(log.twist);
+    const HandFit fit = fit_hand_motion(log.series());
+    EXPECT_TRUE(fit.summary.twist_differenced && fit.summary.acceleration_differenced);
+    EXPECT_TRUE(fit.motion.jumps().empty());
+    // Three series that agreed would follow the noise to some noise/(2 ms)²; a smooth motion of 0.2 s is
+    // known far better.
+    double worst = 0;
+    for (double t = 0.02; t < 0.18; t += 1e-3) {
+      const auto got = flat(fit.motion.at(kAlways, t)), right = swing(t);
+      for (std::size_t k = 6; k < 9; ++k) worst = std::max(worst, std::abs(got[k] - right[k]));
+    }
+    EXPECT_LT(worst, 0.02 * noise / (2e-3 * 2e-3)) << noise;
+  }
+  // Measured beside the pose: noise of their own.
+  const Log own = record(swing, 0, 200, {1e-5, 1e-3, 0.1}, &random);
+  const auto kept = fit_hand_motion(own.series()).summary;
+  EXPECT_FALSE(kept.twist_differenced || kept.acceleration_differenced);
+  // Of a motion without noise every derivative is its difference quotient, as nearly as samples are dense.
+  const Log exact = record([](double t) { return std::array{t, t, t, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0}; }, 0, 200,
+                           {0, 0, 0}, nullptr);
+  const auto smooth = fit_hand_motion(exact.series()).summary;
+  EXPECT_FALSE(smooth.twist_differenced || smooth.acceleration_differenced);
+}
+
 TEST(FitHandMotion, EstimatesNoiseThatIsNotDeclared) {
   std::mt19937_64 random(13);
   Log log = record(Swing{}, -0.01, 311, {1e-4, 2e-3, 0.1}, &random);
