@@ -107,9 +107,8 @@ struct HandFitSummary {
   std::array<double, 3> pose_chi2{}, twist_chi2{}, acceleration_chi2{};     ///< columns x, z, θ [-]
   std::array<double, 3> pose_sigma{}, twist_sigma{}, acceleration_sigma{};  ///< the σ used
   double chi2_per_dof{};                                                    ///< of everything together
-  /// Whether the twist is the difference quotient of the pose, the acceleration that of the twist: then it
-  /// tells nothing of its own, and took no part (its chi2 is 0).
-  bool twist_differenced{}, acceleration_differenced{};
+  bool twist_differenced{};         ///< it is the pose's difference quotient, and took no part: chi2 is 0
+  bool acceleration_differenced{};  ///< likewise of the twist
   bool noise_reached{};  ///< no stretch has a misfit beyond doubt (4.5 standard deviations)
 };
 
