@@ -109,7 +109,7 @@ struct HandFitSummary {
   double chi2_per_dof{};                                                    ///< of everything together
   bool twist_differenced{};         ///< it is the pose's difference quotient, and took no part: chi2 is 0
   bool acceleration_differenced{};  ///< likewise of the twist
-  bool noise_reached{};  ///< no stretch has a misfit beyond doubt (4.5 standard deviations)
+  bool noise_reached{};             ///< no stretch has a misfit beyond doubt (4.5 standard deviations)
 };
 
 /// A smooth hand motion and how it was found.
