@@ -80,7 +80,7 @@ std::vector<std::string> fit_warnings(const FitAnswer& a, const FitRequest& requ
     out.push_back(
         fmt::format("{} ({}) is off by {:.0f} sigma{}: {}. {}", to_string(m.channel), to_string(m.phase),
                     std::sqrt(m.chi2_per_sample()), of_one ? ", nearly all of it in one throw" : "",
-                    m.weight < kHardly ? "it hardly counts in the fit" : "it counts in the fit, and bends it",
+                    m.weight < kHardly ? "it hardly counts in the fit" : "it counts in the fit",
                     of_one ? "A reading that went wrong?"
                            : "Another unit, clock or frame, throws that went wrong, or not this model?"));
   }
