@@ -93,15 +93,15 @@ TEST_P(Arming, AnEvenRootIsAGrazingAndNotAnEvent) {
 }
 
 TEST_P(Arming, APeakOfRoundingOnlyTouches) {
-  // 1e-7 of what the guard changes by from sample to sample: at a sample (each 0.01 s) or between two.
+  // 1e-7 of what the guard changes by from sample to sample: at a sample (each 1/96 s) or between two.
   auto o = options();
-  o.longest_step = o.guard_interval = 0.03;
-  for (const double touch : {0.51, 0.52, 0.53, 0.54, 0.515, 0.5271}) {
+  o.longest_step = o.guard_interval = 1.0 / 32;
+  for (const double touch : {0.5, 0.5 + 1.0 / 96, 0.5 + 2.0 / 96, 0.515, 0.5271}) {
     const auto clock = until_guard(
         {{"touch", Crossing::rising}}, still(),
         [touch](int, const auto& t, const auto&, auto* g) { g[0] = 1e-11 - (t - touch) * (t - touch); },
         FlowKind::frozen);
-    const auto end = run(clock, {1.0, 0.0}, 0.9, o);  // in steps of 0.03 s
+    const auto end = run(clock, {1.0, 0.0}, 1.0, o);
     EXPECT_EQ(end.outcome, Outcome::horizon) << touch;
     EXPECT_EQ(end.statistics.grazings, 1) << touch;
   }
@@ -119,25 +119,34 @@ TEST_P(Arming, APeakBelowZeroIsNoGrazing) {
   }
 }
 
+/// Whether every one of twenty excursions is seen where it begins: of a guard with two roots `width` apart,
+/// in steps of the given length, both in guard intervals.
+template <class Guard>
+void expect_seen(IntegratorOptions o, double step, double width, const Guard& guard) {
+  o.longest_step = step * o.guard_interval;
+  for (int k = 0; k < 20; ++k) {
+    const double half = 0.5 * width * o.guard_interval, middle = 0.04 + 0.053 * k * o.guard_interval;
+    const auto clock = until_guard(
+        {{"bump", Crossing::rising}}, still(),
+        [=](int, const auto& t, const auto&, auto* g) { g[0] = guard((t - middle) / half); },
+        FlowKind::frozen);
+    const auto end = run(clock, {1.0, 0.0}, 0.06, o);
+    EXPECT_EQ(end.outcome, Outcome::finished) << step << " " << width << " " << k;
+    EXPECT_NEAR(end.t, middle - half, kEventTime) << step << " " << width << " " << k;
+  }
+}
+
 TEST_P(Arming, TwoRootsInsideOneStepAreSeenHoweverShortTheStep) {
-  // Steps shorter than a third of the guard interval are sampled at their ends alone, unless the past says
-  // that the guard may rise in between.
-  auto o = options();
   for (const double step : {0.15, 0.3, 0.5, 0.9}) {
-    o.longest_step = step * o.guard_interval;
+    // What shows long before: down to a ninth of the interval.
+    for (const double width : {0.12, 0.3})
+      expect_seen(options(), step, width, [](const auto& u) { return 1.0 - u * u; });
+    // What shows nothing before: no wider than samples are apart.
     for (const double width : {0.34, 0.6})
-      for (int k = 0; k < 20; ++k) {
-        const double half = 0.5 * width * o.guard_interval, middle = 0.04 + 0.053 * k * o.guard_interval;
-        const auto clock =
-            until_guard({{"bump", Crossing::rising}}, still(), [=](int, const auto& t, const auto&, auto* g) {
-              using std::exp;
-              const auto u = (t - middle) / half;
-              g[0] = exp(-u * u) - std::exp(-1.0);
-            });
-        const auto end = run(clock, {1.0, 0.0}, 0.06, o);
-        EXPECT_EQ(end.outcome, Outcome::finished) << step << " " << width << " " << k;
-        EXPECT_NEAR(end.t, middle - half, kEventTime) << step << " " << width << " " << k;
-      }
+      expect_seen(options(), step, width, [](const auto& u) {
+        using std::exp;
+        return exp(-u * u) - std::exp(-1.0);
+      });
   }
 }
 
@@ -146,11 +155,13 @@ TEST_P(Arming, APairOfRootsAfterTheGuardHasBecomeSafeInTheSameStretchIsSeen) {
   // samples.
   auto o = options();
   const double stretch = o.guard_interval;
-  const auto clock =
-      until_guard({{"cubic", Crossing::rising}}, still(), [=](int, const auto& t, const auto&, auto* g) {
+  const auto clock = until_guard(
+      {{"cubic", Crossing::rising}}, still(),
+      [=](int, const auto& t, const auto&, auto* g) {
         const auto u = t / stretch;
         g[0] = -(u - 0.25) * (u - 0.75) * (u - 0.92);
-      });
+      },
+      FlowKind::frozen);
   const auto end = run(clock, {1.0, 0.0}, stretch, o);
   EXPECT_EQ(end.outcome, Outcome::finished);
   EXPECT_NEAR(end.t, 0.75 * stretch, kEventTime);
@@ -160,7 +171,7 @@ TEST_P(Arming, AGuardThatBecameSafeInTheStretchOfAnEventFiresWithIt) {
   // Both pass zero at the same instant; the second has been unsafe at the beginning of the stretch.
   const double stretch = options().guard_interval, root = 0.9 * stretch;
   const Toy two(
-      {{FlowKind::smooth, {{"line", Crossing::rising}, {"parabola", Crossing::rising}}}}, still(),
+      {{FlowKind::frozen, {{"line", Crossing::rising}, {"parabola", Crossing::rising}}}}, still(),
       [=](int, const auto& t, const auto& y, auto* g) {
         g[0] = (t - root) / stretch - y[1];
         g[1] = (t - 0.2 * stretch) * (t - root) / (stretch * stretch);
