@@ -14,7 +14,7 @@
 #include "datasets/slip_log.hpp"
 #include "datasets/summary.hpp"
 #include "dynamics/median.hpp"
-#include "experiment/force_zero.hpp"
+#include "experiment/force_sensor.hpp"
 #include "experiment/landing_noise.hpp"
 #include "experiment/prepared_throw.hpp"
 #include "experiment/time_check.hpp"

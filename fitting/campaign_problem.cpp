@@ -12,7 +12,7 @@
 #include "datasets/near_miss.hpp"
 #include "dynamics/median.hpp"
 #include "experiment/compare.hpp"
-#include "experiment/force_zero.hpp"
+#include "experiment/force_sensor.hpp"
 #include "experiment/glitches.hpp"
 #include "fitting/grasp_scatter.hpp"
 

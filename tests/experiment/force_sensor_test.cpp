@@ -1,5 +1,6 @@
-// A normal force that does not end at zero is told.
-#include "experiment/force_zero.hpp"
+// What a force sensor shows of itself is told: a zero that is none, ringing, the end of its range, filters,
+// hum.
+#include "experiment/force_sensor.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

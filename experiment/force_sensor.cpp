@@ -1,4 +1,4 @@
-#include "experiment/force_zero.hpp"
+#include "experiment/force_sensor.hpp"
 
 #include <fmt/core.h>
 
@@ -74,17 +74,18 @@ std::optional<double> clipped_at(const datasets::Series& series, std::size_t col
 }
 
 /// The autocorrelation of a series' samples from `first` on, about their mean, by lag; empty where they are
-/// too few or all the same.
+/// too few or all the same. A few thousand samples tell.
 std::vector<double> autocorrelation(const std::vector<double>& series, std::size_t first) {
-  constexpr std::size_t kFewest = 20;
+  constexpr std::size_t kFewest = 20, kEnough = 4000, kLags = 500;
   if (series.size() < first + kFewest) return {};
-  std::vector<double> e(series.begin() + static_cast<std::ptrdiff_t>(first), series.end());
+  const auto begin = series.begin() + static_cast<std::ptrdiff_t>(first);
+  std::vector<double> e(begin, begin + static_cast<std::ptrdiff_t>(std::min(series.size() - first, kEnough)));
   const double mean = std::accumulate(e.begin(), e.end(), 0.0) / static_cast<double>(e.size());
   double squares = 0;
   for (double& x : e) x -= mean, squares += x * x;
   if (!(squares > 0)) return {};
   std::vector<double> out;
-  for (std::size_t lag = 0; lag < e.size() / 2; ++lag)
+  for (std::size_t lag = 0; lag < std::min(e.size() / 2, kLags); ++lag)
     out.push_back(std::inner_product(e.begin() + static_cast<std::ptrdiff_t>(lag), e.end(), e.begin(), 0.0) /
                   squares);
   return out;
