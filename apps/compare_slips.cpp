@@ -159,8 +159,9 @@ void compare_slips(const CompareRequest& request) {
   Scores scores;
   {
     Progress progress("fit", surface_comparison_steps(surfaces.size(), models.size(), options));
-    options.step = [&] { progress.step(); };
-    scores = fitting::compare_surfaces(surfaces, models, options);
+    auto counted = options;
+    counted.step = [&] { progress.step(); };
+    scores = fitting::compare_surfaces(surfaces, models, counted);
   }
   report_failures(scores);
 

@@ -26,7 +26,7 @@ Columns sigma_to_use(std::span<const double> rows, const Columns& declared) {
   return out;
 }
 
-// Whether `derived` is a difference quotient of `values` in all three columns, and has noise: of a smooth
+// Whether `derived` is a difference quotient of `values` in all columns that move, and has noise: of a smooth
 // motion every derivative is its difference quotient.
 bool is_differenced(std::span<const double> time, std::span<const double> values,
                     std::span<const double> derived) {
@@ -34,9 +34,12 @@ bool is_differenced(std::span<const double> time, std::span<const double> values
   constexpr double kMost = 0.9;  // of the samples: ends, and what was clipped, may be otherwise
   const std::size_t n = time.size();
   if (n < 8) return false;
+  bool moves = false;
   for (std::size_t c = 0; c < 3; ++c) {
     double largest = 0;
     for (std::size_t i = 0; i < n; ++i) largest = std::max(largest, std::abs(derived[3 * i + c]));
+    if (largest == 0) continue;
+    moves = true;
     if (!(dynamics::white_noise(derived, c, 3) > kNoisy * largest)) return false;
     std::array<std::size_t, 3> same{};  // central, backward, forward
     for (std::size_t i = 1; i + 1 < n; ++i) {
@@ -51,7 +54,7 @@ bool is_differenced(std::span<const double> time, std::span<const double> values
     if (static_cast<double>(*std::max_element(same.begin(), same.end())) < kMost * static_cast<double>(n - 2))
       return false;
   }
-  return true;
+  return moves;
 }
 
 // Samples on each side of a jump: of strong ones, and of weak but noisy ones.
