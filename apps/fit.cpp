@@ -104,7 +104,8 @@ void fit_throws(const FitRequest& request, const datasets::ThrowLog& log) {
   progress.step();
   const auto cost = fitting::gradient_cost(problem, fit);
   FitAnswer answer{problem, fit, {}, {}, {}, {}, cost, 1, {}};
-  for (const auto& noise : datasets::summarise(log).noise)
+  const auto summary = datasets::summarise(log);
+  for (const auto& noise : summary.noise)
     if (const auto columns = noise.understated(); !columns.empty())
       answer.understated.push_back(noise.dataset + " scatters by more than it declares, " + columns);
   answer.origin = origin_text(log);
