@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <map>
 #include <memory>
-#include <sstream>
 
 #include "apps/command.hpp"
 #include "apps/output.hpp"

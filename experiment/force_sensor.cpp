@@ -109,6 +109,79 @@ std::optional<Likeness> likeness(const datasets::FtLog& ft, double release) {
   return out;
 }
 
+std::string force_path(const datasets::Throw& one, const char* name) {
+  return fmt::format("/throws/{}/ft/{}", one.id, name);
+}
+
+void note_later_rise(const datasets::ThrowLog& log, const ForceOpenings& openings,
+                     std::vector<LogNote>& out) {
+  Tally rises;
+  for (std::size_t i = 0; i < log.throws.size(); ++i) {
+    if (!openings[i] || !(openings[i]->later_rise > 0)) continue;
+    const double rise = openings[i]->later_rise;
+    rises.add(
+        force_path(log.throws[i], "normal_force"),
+        fmt::format(
+            "rises again by {:.3g} N ({:.2g} % of the grip) after the pads have parted: a sensor that "
+            "rings, or pads that touch once more? The object is taken for free from the first release on",
+            rise, 100 * rise / openings[i]->grip_force),
+        rise);
+  }
+  rises.end(out);
+}
+
+void note_clipping(const datasets::ThrowLog& log, std::vector<LogNote>& out) {
+  struct Column {
+    const char *name, *unit;
+    datasets::Series datasets::FtLog::*series;
+    std::size_t index;
+  };
+  constexpr Column kColumns[] = {{"normal_force", "N", &datasets::FtLog::normal_force, 0},
+                                 {"wrench, fx", "N", &datasets::FtLog::wrench, 0},
+                                 {"wrench, fz", "N", &datasets::FtLog::wrench, 1},
+                                 {"wrench, tau", "N m", &datasets::FtLog::wrench, 2}};
+  for (const Column& column : kColumns) {
+    Tally clips;
+    for (const auto& one : log.throws)
+      if (const auto end = one.ft ? clipped_at((*one.ft).*column.series, column.index) : std::nullopt)
+        clips.add(
+            force_path(one, column.name),
+            fmt::format("stands at {:.4g} {}, which it never passes: the end of the sensor's range? What is "
+                        "cut off there is missing in fits",
+                        *end, column.unit));
+    clips.end(out);
+  }
+}
+
+/// Of throws whose force does not rise again, and only where most are so.
+void note_likeness(const datasets::ThrowLog& log, const ForceOpenings& openings, std::vector<LogNote>& out) {
+  constexpr std::size_t kFewest = 5;  // throws
+  constexpr double kAlike = 0.5;      // correlation
+  std::vector<double> neighbours, periods;
+  LogNote note;
+  for (std::size_t i = 0; i < log.throws.size(); ++i) {
+    const auto& one = log.throws[i];
+    if (!one.ft || !openings[i] || openings[i]->later_rise > 0) continue;
+    const auto like = likeness(*one.ft, openings[i]->release_time);
+    if (!like) continue;
+    neighbours.push_back(like->neighbours);
+    periods.push_back(like->period);
+    if (like->neighbours > kAlike && note.throws++ == 0) note.path = force_path(one, "normal_force");
+  }
+  if (neighbours.size() < kFewest) return;
+  const double rho = dynamics::median(neighbours), period = dynamics::median(periods);
+  if (!(rho > kAlike)) return;
+  const std::string cause =
+      period > 0
+          ? fmt::format("hum of some {:.2g} Hz? It moves the release that is read off each throw", 1 / period)
+          : "a low-pass filter? It delays and rounds the opening, and friction that is fitted follows it: "
+            "log "
+            "the force unfiltered, or with as fast a filter as the sensor has";
+  note.said =
+      fmt::format("neighbouring samples after the release are alike (correlation {:.2f}): {}", rho, cause);
+  out.push_back(note);
+}
+
 }  // namespace
 
 std::string UntaredForce::in_words() const {
@@ -157,57 +230,11 @@ std::optional<UntaredForce> untared_force(const ForceOpenings& openings) {
 }
 
 std::vector<LogNote> force_notes(const datasets::ThrowLog& log, const ForceOpenings& openings) {
-  constexpr std::size_t kFewest = 5;  // throws
-  constexpr double kAlike = 0.5;      // correlation
-  Tally rises, alike;
-  std::vector<Tally> clips(4);  // of the normal force, and of the wrench by column
-  std::vector<double> neighbours, periods;
   std::vector<LogNote> out;
-  for (std::size_t i = 0; i < log.throws.size(); ++i) {
-    const auto& one = log.throws[i];
-    if (!one.ft || log.dimension != 2) continue;
-    const std::string path = "/throws/" + one.id + "/ft/";
-    const auto clip = [&](const datasets::Series& series, std::size_t column, Tally& clipped,
-                          const std::string& name) {
-      if (const auto end = clipped_at(series, column))
-        clipped.add(path + name,
-                    fmt::format("stands at {:.4g} {}, which it never passes: the end of the sensor's "
-                                "range? What is cut off there is missing in fits",
-                                *end, column == 2 ? "N m" : "N"));
-    };
-    clip(one.ft->normal_force, 0, clips[0], "normal_force");
-    constexpr const char* kColumns[] = {"wrench, fx", "wrench, fz", "wrench, tau"};
-    for (std::size_t c = 0; c < 3 && !one.ft->wrench.empty(); ++c)
-      clip(one.ft->wrench, c, clips[c + 1], kColumns[c]);
-    if (!openings[i]) continue;
-    if (const double rise = openings[i]->later_rise; rise > 0) {
-      rises.add(
-          path + "normal_force",
-          fmt::format(
-              "rises again by {:.3g} N ({:.2g} % of the grip) after the pads have parted: a sensor that "
-              "rings, or pads that touch once more? The object is taken for free from the first "
-              "release on",
-              rise, 100 * rise / openings[i]->grip_force),
-          rise);
-    } else if (const auto like = likeness(*one.ft, openings[i]->release_time)) {
-      neighbours.push_back(like->neighbours);
-      periods.push_back(like->period);
-      if (like->neighbours > kAlike) alike.add(path + "normal_force", "");
-    }
-  }
-  rises.end(out);
-  for (const Tally& clipped : clips) clipped.end(out);
-  if (neighbours.size() >= kFewest && dynamics::median(neighbours) > kAlike) {
-    alike.end(out);
-    const double rho = dynamics::median(neighbours), period = dynamics::median(periods);
-    out.back().said = fmt::format(
-        "neighbouring samples after the release are alike (correlation {:.2f}): {}", rho,
-        period > 0 ? fmt::format("hum of some {:.2g} Hz? It moves the release that is read off each throw",
-                                 1 / period)
-                   : std::string(
-                         "a low-pass filter? It delays and rounds the opening, and friction that is fitted "
-                         "follows it: log the force unfiltered, or with as fast a filter as the sensor has"));
-  }
+  if (log.dimension != 2) return out;
+  note_later_rise(log, openings, out);
+  note_clipping(log, out);
+  note_likeness(log, openings, out);
   return out;
 }
 

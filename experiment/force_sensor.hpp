@@ -40,9 +40,8 @@ std::optional<UntaredForce> untared_force(const ForceOpenings& openings);
 /// - a normal force that rises again after its release (NormalForceSummary::later_rise);
 /// - a column that stands at its largest or smallest value for eight samples or more, though it has noise
 ///   elsewhere: a sensor at the end of its range;
-/// - a normal force whose samples after the release are alike (correlation of neighbours, median over five
-/// throws
-///   or more, above a half): by a low-pass filter, or periodically, by hum.
+/// - a normal force whose samples after the release are alike, by a low-pass filter or by hum: correlation of
+///   neighbours above a half, in the median over five throws or more.
 std::vector<LogNote> force_notes(const datasets::ThrowLog& log, const ForceOpenings& openings);
 
 }  // namespace unhand::experiment

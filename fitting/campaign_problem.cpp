@@ -100,9 +100,8 @@ CampaignProblem::CampaignProblem(const datasets::ThrowLog& logged, const std::st
       n > 0)
     notes_.push_back(fmt::format(
         "hand/twist or hand/acceleration are difference quotients of the series before them in {} of {} "
-        "throws: they "
-        "tell nothing of their own and are not used; how the hand accelerates is known better from a robot's "
-        "controller",
+        "throws: they tell nothing of their own and are not used; how the hand accelerates is known better "
+        "from a robot's controller",
         n, prepared.size()));
   if (!options.predict_only) guess_start(log, prepared, !grips.empty());
   if (const auto scatter = grasp_scatter_across(log, prepared); scatter.is_evident()) {
